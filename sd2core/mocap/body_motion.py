@@ -31,7 +31,6 @@ class BodyMotion:
 
     trial: str
     person: str
-    what: str
     role: Role
     shape: BodyShape  # of the person
     vectors: Floats  # (T, J, 3) rotation vectors of the joints of sd2core.body.rig.JOINTS
@@ -71,6 +70,7 @@ class BodyMotion:
                 for name, value in arrays.items()
             }
             shape = known.pop("shape")
+            known.pop("what", None)  # a description, in files of before
             return cls(shape=BodyShape(shape[:-1], float(shape[-1])), **known)
         except (KeyError, TypeError, ValueError) as error:
             raise Sd2Error(f"{path} holds no body's motion ({error})", _EXPECTED) from error

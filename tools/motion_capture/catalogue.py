@@ -7,7 +7,6 @@ those that only measure.
 
 from __future__ import annotations
 
-import csv
 from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -51,18 +50,6 @@ _MISSING = -32768
 _UI_RATE_HZ = 33.0
 _REPETITIONS = frozenset({"e02", "e05", "e08"})
 """Of ten that are much alike."""
-_UI_KINDS = (
-    "deep squat",
-    "hurdle step",
-    "inline lunge",
-    "side lunge",
-    "sit to stand",
-    "leg raise",
-    "shoulder abduction",
-    "shoulder extension",
-    "shoulder rotation",
-    "shoulder scaption",
-)
 
 
 @dataclass(frozen=True)
@@ -71,7 +58,6 @@ class Trial:
 
     name: str
     person: str
-    what: str  # as its source describes it
     path: Path
     skeleton: Path | None = None  # of an AMC file
     episode: int | None = None  # of a file of UI-PRMD
@@ -102,7 +88,6 @@ def trials(folder: Path) -> list[Trial]:
 
     Raises Sd2Error if the folder is not one of motion capture.
     """
-    described = _descriptions(folder)
     by_name: dict[str, Trial] = {}
     for path in sorted((folder / "cmu_amc").glob("*.amc.gz")):
         stem = path.name.partition(".")[0]
@@ -110,39 +95,26 @@ def trials(folder: Path) -> list[Trial]:
         subject = trial.partition("_")[0]
         skeleton = path.parent / f"{subject}{dash}{variant}.asf.gz"
         if skeleton.exists() and trial not in _NO_PERSON:
-            what = described.get(path.name, "")
-            by_name[trial] = Trial(trial, f"cmu{subject}", what, path, skeleton=skeleton)
+            by_name[trial] = Trial(trial, f"cmu{subject}", path, skeleton=skeleton)
     for path in sorted((folder / "cmu_bvh").glob("*.bvh.gz")):
         converter, _, trial = path.name.partition(".")[0].partition("_")
         person = trial.partition("_")[0]
         if converter != "dance":
             person = f"cmu{person}"
         if trial not in by_name:
-            what = described.get(f"{trial}.bvh.gz", "dance" if converter == "dance" else "")
-            by_name[trial] = Trial(trial, person, what, path)
-    for number, kind in enumerate(_UI_KINDS, start=1):
-        path = folder / "uiprmd" / f"m{number:02d}_ok.npz"
-        if path.exists():
-            with np.load(path) as data:
-                names = [str(name) for name in data["names"]]
-            for episode, name in enumerate(names):
-                if name[-3:] not in _REPETITIONS:
-                    continue
-                trial = f"ui_m{number:02d}_{name}"
-                by_name[trial] = Trial(trial, f"ui{name[1:3]}", kind, path, episode=episode)
+            by_name[trial] = Trial(trial, person, path)
+    for path in sorted((folder / "uiprmd").glob("m??_ok.npz")):
+        with np.load(path) as data:
+            names = [str(name) for name in data["names"]]
+        for episode, name in enumerate(names):
+            if name[-3:] in _REPETITIONS:
+                trial = f"ui_{path.name[:3]}_{name}"
+                by_name[trial] = Trial(trial, f"ui{name[1:3]}", path, episode=episode)
     if not by_name:
         raise Sd2Error(
             f"{folder} holds no motion capture", "a folder with cmu_amc/, cmu_bvh/ or uiprmd/"
         )
     return [by_name[name] for name in sorted(by_name)]
-
-
-def _descriptions(folder: Path) -> dict[str, str]:
-    path = folder / "trials.csv"
-    if not path.exists():
-        return {}
-    with path.open(encoding="utf-8") as stream:
-        return {row["file"]: row["description"] for row in csv.DictReader(stream)}
 
 
 def _ui_points(path: Path, episode: int) -> Floats:
@@ -226,7 +198,6 @@ def _drive(out: Path, own: Sequence[Trial]) -> list[str]:
         motion = BodyMotion(
             trial.name,
             trial.person,
-            trial.what,
             trial.role,
             puppet.shape,
             to_vector(pose.turns),

@@ -37,7 +37,7 @@ def recorded(person: str, role: str = "learn") -> BodyMotion:
     way_m = np.zeros((len(times_s), 3))
     way_m[:, 2] = -WALKS_MPS * times_s
     shape = BodyShape(np.zeros(len(SPACE)), 1.7)
-    return BodyMotion(f"{person}-{role}", person, "walk", role, shape, vectors, way_m, 0.01)  # type: ignore[arg-type]
+    return BodyMotion(f"{person}-{role}", person, role, shape, vectors, way_m, 0.01)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ def rig_of(shape: BodyShape) -> Rig:
 def motion(stature_m: float = 1.7, **more: str) -> BodyMotion:
     """A body that is shifted by a metre while its joints turn a little."""
     rng = np.random.default_rng(1)
-    told = {"trial": "t", "person": "p", "what": "walk", "role": "learn"} | more
+    told = {"trial": "t", "person": "p", "role": "learn"} | more
     way_m = np.linspace(0.0, 1.0, 12)[:, None] * [1.0, 0.0, 0.0]
     return BodyMotion(
         shape=BodyShape(np.zeros(len(SPACE)), stature_m),

@@ -20,7 +20,7 @@ def test_a_calm_motion_of_another_person_is_measured(tmp_path: Path) -> None:
     vectors[:, shoulder, 0] = 0.3 * np.sin(3.0 * times_s)
     shape = BodyShape(np.zeros(len(ShapeSpace())), 1.7)
     still = np.zeros((60, 3))
-    calm = BodyMotion("99_01", "cmu99", "wave", "learn", shape, vectors, still, 0.01)
+    calm = BodyMotion("99_01", "cmu99", "learn", shape, vectors, still, 0.01)
     calm.save(tmp_path / "99_01.npz")
     replace(calm, trial="05_01", person="cmu05").save(tmp_path / "05_01.npz")
     short = replace(calm, trial="99_02", vectors=vectors[:20], translation_m=still[:20])

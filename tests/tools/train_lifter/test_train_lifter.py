@@ -214,7 +214,7 @@ def _swaying() -> BodyMotion:
     vectors[:, 0, 1] = np.linspace(0.0, 1.0, 60)
     vectors[:, 1, 0] = 0.2 * np.sin(np.arange(60) / 5.0)
     shape = BodyShape(np.zeros(len(space)), 1.7)
-    return BodyMotion("t", "p", "sway", "learn", shape, vectors, np.zeros((60, 3)), 0.01)
+    return BodyMotion("t", "p", "learn", shape, vectors, np.zeros((60, 3)), 0.01)
 
 
 def test_numpy_and_torch_agree() -> None:
