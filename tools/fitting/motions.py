@@ -95,7 +95,7 @@ def duration_s(action: Action, seed: int) -> float:
 def perform(
     skeleton: Skeleton, action: Action, times_s: Floats, seed: int, arm_scale: float = 1.0
 ) -> Performance:
-    """Carry an action out; those of real people are in :mod:`tools.fitting.captured`.
+    """Carry an action out; those of real people are in :mod:`tools.fitting.clips`.
 
     Parameters
     ----------
