@@ -9,8 +9,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 
-from matplotlib.figure import Figure
-
 from sd2core import PRESETS, MeshSequence, VirtualSensor, load_mesh, open_recording
 from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.measuring import measure
@@ -32,7 +30,7 @@ from tools.documentation.measured import (
 sys.path.insert(0, str(BENCHMARKS.parent))
 sys.path.insert(0, str(BENCHMARKS))
 from precisions import costs, errors, in_both_precisions
-from scaling import BUDGET_BYTES, Scaling, scalings
+from scaling import BUDGET_BYTES, scalings
 
 TOLERANCES = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
 PAPER = PRESETS["paper"]
@@ -118,7 +116,6 @@ def _measured(measurement: Measurement, picture: str) -> str:
 
 def _scaling() -> str:
     measured = [scaling for sight in ("facing", "exact") for scaling in scalings(sight)]
-    save_figure(_scaling_plot(measured), IMAGES / "scaling.png")
     rows = [["what", "sizes", "growth", "longest, s", "most memory, MB"]]
     for scaling in measured:
         first, last = scaling.points[0], scaling.points[-1]
@@ -138,28 +135,6 @@ def _precision() -> dict[str, str]:
     measured = costs(in_both_precisions(mesh))
     ratios = ", ".join(f"{cost.ratio:.2f} ({cost.what})" for cost in measured)
     return {"precision": table(rows), "ratios": ratios}
-
-
-def _scaling_plot(measured: list[Scaling]) -> Figure:
-    figure = Figure(figsize=(9.0, 4.0), dpi=120, layout="constrained")
-    cost, memory = figure.subplots(1, 2)
-    for scaling in measured:
-        sizes = [point.size / scaling.points[0].size for point in scaling.points]
-        seconds = [point.seconds / scaling.points[0].seconds for point in scaling.points]
-        cost.plot(sizes, seconds, marker="o", label=scaling.what)
-        memory.plot(
-            sizes, [p.peak_bytes / 1e6 for p in scaling.points], marker="o", label=scaling.what
-        )
-    longest = max(len(scaling.points) for scaling in measured)
-    tenfold = [10.0**k for k in range(longest)]
-    cost.plot(tenfold, tenfold, color="black", linewidth=0.8, linestyle=":", label="in proportion")
-    memory.axhline(BUDGET_BYTES / 1e6, color="black", linewidth=0.8, linestyle=":", label="budget")
-    cost.set(xscale="log", yscale="log", xlabel="times the size", ylabel="times the seconds")
-    memory.set(xscale="log", yscale="log", xlabel="times the size", ylabel="most memory (MB)")
-    for axes in (cost, memory):
-        axes.grid(which="both", alpha=0.2)
-        axes.legend(fontsize=7)
-    return figure
 
 
 def _words(plan: AccuracyPlan) -> str:

@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from sd2core.denoise.files import load_model
-from sd2core.files.figure_files import save_figure
 from sd2core.pairs.store import read_pairs
-from tools.documentation.measured import IMAGES, filled, table
+from tools.documentation.measured import filled, table
 from tools.documentation.runs import MEMORY, Job, evaluated, sd2, settings, train
 
 LENGTHS = (72, 288, 1152, 4608)
@@ -27,7 +25,7 @@ _FRAMES = 4608
 def long_sequences(folder: Path, minutes: float) -> str:
     """Train what is missing; the text of the section, and its picture."""
     folder.mkdir(parents=True, exist_ok=True)
-    curves: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
+    nearest = []
     rows = [["network", "segment", "peak MAE m/s", "mean MAE m/s", "map RMSE", "memory", "time"]]
     for title, (rate, bins, take_s, total_min) in SETTINGS.items():
         data = folder / f"{rate}.zarr"
@@ -49,15 +47,17 @@ def long_sequences(folder: Path, minutes: float) -> str:
         none, *_ = groups
         reports = {one["name"]: one["all"] for group in groups for one in group["models"]}
         rows.append([f"**{title}**: none", "", *_errors(none["models"][0]["all"]), "", ""])
-        curves[title] = {}
         for (model, length), run in zip(kinds, runs, strict=True):
             score = reports[run.name]
-            curves[title][model, length] = score
             memory = f"{int((run / MEMORY).read_text()) / 1e6:.0f} MB"
             took = f"{1e6 * _frame_s(run, data):.0f} µs"
             rows.append([model, f"{length:,}", *_errors(score), memory, took])
-    _draw(curves)
-    return filled("long-sequences.md", nearest=_nearest(curves), minutes=minutes, table=table(rows))
+        errors_mps = [reports[run.name]["mean"]["mae_mps"] for run in runs]
+        model, length = kinds[errors_mps.index(min(errors_mps))]
+        nearest.append(f"{model} of {length:,} frames at {title}")
+    return filled(
+        "long-sequences.md", nearest="; ".join(nearest), minutes=minutes, table=table(rows)
+    )
 
 
 def _errors(score: dict[str, Any]) -> list[str]:
@@ -87,32 +87,3 @@ def _frame_s(run: Path, data: Path) -> float:
     began = time.perf_counter()
     model.denoise_values(values)
     return (time.perf_counter() - began) / len(values)
-
-
-def _nearest(curves: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> str:
-    """Network and segment with the nearest mean velocity, of each setting."""
-    words = []
-    for title, scores in curves.items():
-        model, length = min(scores, key=lambda run: scores[run]["mean"]["mae_mps"])
-        words.append(f"{model} of {length:,} frames at {title}")
-    return "; ".join(words)
-
-
-def _draw(curves: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> None:
-    figure = Figure(figsize=(9.6, 3.4), dpi=110, layout="constrained")
-    for axes, (title, scores) in zip(figure.subplots(1, len(curves)), curves.items(), strict=True):
-        for model in MODELS:
-            points = [(length, scores[name, length]) for name, length in scores if name == model]
-            axes.plot(
-                [length for length, _ in points],
-                [score["mean"]["mae_mps"] for _, score in points],
-                marker="o",
-                label=model,
-            )
-        axes.set_xscale("log", base=2)
-        axes.set_xticks(LENGTHS, [f"{length:,}" for length in LENGTHS])
-        axes.set_xlabel("frames of a segment")
-        axes.set_title(title, fontsize=9, loc="left")
-    figure.axes[0].set_ylabel("mean velocity, MAE m/s")
-    figure.axes[0].legend(frameon=False, fontsize=8)
-    save_figure(figure, IMAGES / "denoiser-lengths.png")
