@@ -125,26 +125,11 @@ moving-picture: $(TESTS)
 accuracy: setup
 	$(BIN)/python -m tools.documentation.accuracy_and_speed
 
-fitting: setup
-	$(BIN)/python -m tools.documentation.fitting
-
-denoiser: setup
-	$(BIN)/python -m tools.documentation.denoiser
-
-range-synthesis: setup
-	$(BIN)/python -m tools.documentation.range_synthesis
-
 classifier: setup
 	$(BIN)/python -m tools.documentation.studies classifier
 
-real-gestures: setup
-	$(BIN)/python -m tools.documentation.real_gestures
-
-paper: setup
-	$(BIN)/python -m tools.documentation.paper
-
-scale: setup
-	$(BIN)/python -m tools.documentation.scale
+fitting denoiser range-synthesis real-gestures paper scale: setup
+	$(BIN)/python -m tools.documentation.$(subst -,_,$@)
 
 MINUTES ?= 60
 soak: $(TESTS)

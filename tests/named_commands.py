@@ -165,6 +165,7 @@ def _fault_of_target(words: list[str]) -> str | None:
             continue
         if attached and f"$({name})" not in rules and f"export {name}" not in rules:
             return f"the Makefile has no variable {name}"
-        if not attached and not re.search(rf"^{re.escape(name)}:(?!=)", rules, re.MULTILINE):
+        rule = rf"^(?:[\w-]+ )*{re.escape(name)}(?: [\w-]+)*:(?!=)"
+        if not attached and not re.search(rule, rules, re.MULTILINE):
             return f"the Makefile has no target {name}"
     return None

@@ -23,7 +23,7 @@ _FRAMES = 4608
 
 
 def long_sequences(folder: Path, minutes: float) -> str:
-    """Train what is missing; the text of the section, and its picture."""
+    """Train what is missing; the text of the section."""
     folder.mkdir(parents=True, exist_ok=True)
     nearest = []
     rows = [["network", "segment", "peak MAE m/s", "mean MAE m/s", "map RMSE", "memory", "time"]]
