@@ -144,27 +144,6 @@ def _proposed(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _outcodes(image, depth, near, xmin, xmax, ymin, ymax, dmax, code):  # type: ignore[no-untyped-def]
-    """Set a bit for each side on which a vertex lies outside of bounds.
-
-    Three corners outside on one side: so is the triangle. Vertices that ``near`` cuts off, and
-    those so far out that the triangle's own edge tolerance exceeds their rounding, have no bits.
-    """
-    widest = max(max(abs(xmin), abs(xmax)), max(abs(ymin), abs(ymax)))
-    for v in range(code.shape[0]):
-        x, y = image[0, v], image[1, v]
-        size = max(max(abs(x), abs(y)), widest)
-        reach = np.float32(4) * _ROUNDING * size
-        sides = np.uint8(x + reach < xmin) | np.uint8(x - reach > xmax) << np.uint8(1)
-        sides |= np.uint8(y + reach < ymin) << np.uint8(2) | np.uint8(y - reach > ymax) << np.uint8(
-            3
-        )
-        sides |= np.uint8(depth[v] > dmax) << np.uint8(4)
-        plain = (depth[v] > near) & (size <= np.float32(1000) * widest)
-        code[v] = sides if plain else np.uint8(0)
-
-
-@compiled
 def search_scratch(vertices):  # type: ignore[no-untyped-def]
     """Work space of :func:`search_view` for so many vertices."""
     cell, start = np.empty(vertices, np.int32), np.empty(MAX_CELLS + 2, np.int32)
@@ -250,12 +229,8 @@ def search_view(  # type: ignore[no-untyped-def]
     sorted_x, sorted_y = sorted_image[0], sorted_image[1]
     corners = np.empty((3, 3), np.float64)
     bounds = np.empty(4, np.float64)
-    code = np.empty(vertices, np.uint8)
-    _outcodes(image, depth, near, xmin, xmax, ymin, ymax, dmax, code)
     for f in range(faces.shape[0]):
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        if code[i] & code[j] & code[k]:
-            continue
         d0, d1, d2 = depth[i], depth[j], depth[k]
         nearest = min(d0, d1, d2)
         if nearest > dmax:
