@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import glob
 import io
 import json
 import shutil
@@ -16,12 +17,7 @@ import numpy as np
 
 from sd2core.cutouts.source import FORMAT, CutSource, folder_name
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import (
-    atomic_write_json,
-    atomic_write_text,
-    full_disk_named,
-    replace_folder,
-)
+from sd2core.files.atomic import atomic_folder, atomic_write_json, atomic_write_text
 from sd2core.files.lock import FileLock
 from sd2core.files.tables import as_cell
 from sd2core.files.texts import read_json
@@ -33,7 +29,8 @@ from sd2core.progress import Progress, silent
 
 State = Literal["new", "same", "other", "empty"]  # The last has no frame.
 _DETAILS = "span.json"
-_UNFINISHED = ".sd2-cut-"
+_UNFINISHED = ".sd2-cut-*"
+"""What earlier versions left unfinished."""
 _LOCK = ".sd2-lock"
 _CRF, _PRESET = 16, "fast"
 _COLUMNS = (
@@ -112,13 +109,14 @@ def cut_out(
             f"Another process is writing to {folder}", "a folder of its own", "Wait for that"
         )
     try:
-        for left in folder.glob(f"{_UNFINISHED}*"):
+        unfinished = [f".{glob.escape(one.path.name)}.*.tmp" for one in cuts]
+        for left in (one for name in (_UNFINISHED, *unfinished) for one in folder.glob(name)):
             shutil.rmtree(left, ignore_errors=True)
         wanted = [
             one for one in cuts if one.state == "new" or (one.state == "other" and replace_others)
         ]
         try:
-            return _write_all(source, wanted, folder, progress)
+            return _write_all(source, wanted, progress)
         finally:
             write_index(folder)
     finally:
@@ -149,9 +147,7 @@ def write_index(folder: Path) -> None:
     atomic_write_json(folder / "index.json", content)
 
 
-def _write_all(
-    source: CutSource, wanted: Sequence[Cut], folder: Path, progress: Progress
-) -> list[Path]:
+def _write_all(source: CutSource, wanted: Sequence[Cut], progress: Progress) -> list[Path]:
     sizes = [stop - first for first, stop in (source.frames_of(one.span) for one in wanted)]
     done, total = 0, sum(sizes)
     progress(0, total)
@@ -163,17 +159,8 @@ def _write_all(
             def within(frames: int, _: int, start: int = start) -> None:
                 progress(start + frames, total)
 
-            made = folder / f"{_UNFINISHED}{one.span.id}"
-            aside = made.with_name(f"{made.name}-before")  # for a folder that is in the way
-            made.mkdir()
-            try:
-                with full_disk_named(one.path):
-                    _write_one(source, one.span, video, made, within)
-                    replace_folder(made, one.path, aside)
-                shutil.rmtree(aside, ignore_errors=True)
-            except BaseException:
-                shutil.rmtree(made, ignore_errors=True)
-                raise
+            with atomic_folder(one.path) as made:
+                _write_one(source, one.span, video, made, within)
             done += size
             progress(done, total)
     return [one.path for one in wanted]

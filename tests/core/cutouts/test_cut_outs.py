@@ -231,11 +231,11 @@ cut(source, Path({str(tmp_path)!r}), WAVE, PUSH, progress=end)
     here = str(Path(__file__).parent)
     code = f"import sys; sys.path.insert(0, {here!r})\n{script}"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 9
-    assert [path.name for path in tmp_path.glob("*s_*")] == [folder_name(WAVE)]
-    assert list(tmp_path.glob(".sd2-cut-*"))
+    assert [path.name for path in tmp_path.glob("[0-9]*")] == [folder_name(WAVE)]
+    assert list(tmp_path.glob(".*.tmp"))
     only = source.only(["video"])
     assert [path.name for path in cut(only, tmp_path, WAVE, PUSH)] == [folder_name(PUSH)]
-    assert not list(tmp_path.glob(".sd2-cut-*"))
+    assert not list(tmp_path.glob(".*.tmp"))
 
 
 def test_cut_outs_of_before_have_a_half_open_pair_of_frames(source, tmp_path) -> None:

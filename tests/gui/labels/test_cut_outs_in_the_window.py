@@ -136,7 +136,7 @@ def test_cancelled_it_leaves_whole_folders_only(window, qtbot, cuts) -> None:
     c.jobs.cancel(job)
     assert not c.jobs.jobs
     c.cut_out.close()
-    assert not list(cuts.glob(".sd2-cut-*"))
+    assert not list(cuts.glob(".*.tmp"))
 
 
 @pytest.mark.slow
