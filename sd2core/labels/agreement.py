@@ -19,12 +19,10 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.matching import SpanAgreement, match_spans
 from sd2core.labels.spans import Labels, Span
 from sd2core.mesh.presence import runs
-from sd2core.timebase import Timebase
+from sd2core.timebase import Timebase, frames_that_begin
 
 Answer = tuple[str, ...]
 """One annotator's labels of a frame, in alphabetical order, perhaps none."""
-
-_ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True)
@@ -135,10 +133,9 @@ def held_labels(spans: Sequence[Span], labels: list[str], timebase: Timebase) ->
     """Return whether each label is present in each frame, (labels, T)."""
     held = np.zeros((len(labels), len(timebase)), bool)
     rows = {label: row for row, label in enumerate(labels)}
-    edges_s = np.array([(span.start_s, span.end_s) for span in spans]).reshape(-1, 2) - _ROUNDING_S
-    edges = np.searchsorted(timebase.times_s, edges_s).tolist()
-    for span, (first, stop) in zip(spans, edges, strict=True):
-        held[rows[span.label], first:stop] = True
+    for span in spans:
+        during = frames_that_begin(timebase.times_s, span.start_s, span.end_s)
+        held[rows[span.label], during] = True
     return held
 
 
