@@ -16,6 +16,7 @@ import numpy as np
 
 from sd2core.errors import Sd2Error
 from sd2core.files.tables import counted
+from sd2core.labels.formats.lanes import apart, edges_s
 from sd2core.labels.formats.losses import DEFAULT_TRACK
 from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
@@ -229,7 +230,11 @@ def assembled(content: LabelRows, clock: LabelClock) -> LabelReading:
         overlaps.setdefault(span.track, None)
     if not overlaps:
         overlaps[DEFAULT_TRACK] = None
-    crowded = _overlapping(spans)
+    crowded = {
+        name
+        for name in overlaps
+        if len(apart([span for span in spans if span.track == name], edges_s)) > 1
+    }
     made = tuple(
         LabelTrack(name, "free" if name in crowded else overlap or "exclusive")
         for name, overlap in overlaps.items()
@@ -332,13 +337,3 @@ def _ids(rows: Sequence[Row]) -> list[int]:
             number += 1
             kept[index] = number
     return [number for number in kept if number is not None]
-
-
-def _overlapping(spans: Sequence[Span]) -> set[str]:
-    last_end_s: dict[str, float] = {}
-    crowded: set[str] = set()
-    for span in sorted(spans, key=lambda one: (one.start_s, one.end_s)):
-        if span.start_s < last_end_s.get(span.track, float("-inf")):
-            crowded.add(span.track)
-        last_end_s[span.track] = max(span.end_s, last_end_s.get(span.track, span.end_s))
-    return crowded
