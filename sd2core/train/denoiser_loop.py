@@ -134,13 +134,9 @@ class DenoiserLoop(Loop):
             self._keep()
         return None
 
-    def check(self) -> dict[str, Any] | None:
-        """Errors on the people who are kept out to choose by; None if the run is cancelled."""
-        validation = validate(
-            self._network, self._validator, lambda: self._control.word() != "cancel"
-        )
-        if validation is None:
-            return None
+    def check(self) -> dict[str, Any]:
+        """Errors on the people who are kept out to choose by."""
+        validation = validate(self._network, self._validator)
         if not math.isfinite(validation.rmse):
             raise _diverged(self.position.steps_done)
         self._validation = validation
@@ -156,13 +152,11 @@ class DenoiserLoop(Loop):
         assert self._validation is not None
         self._write_best(self._validation, self.position.epoch + 1)
 
-    def end_epoch(self) -> bool | None:
+    def end_epoch(self) -> bool:
         """Say the errors of the epoch as well, and count those of the next from zero."""
         position = self.position
         position.squares = self._finite_squares()
         best = super().end_epoch()
-        if best is None:
-            return None
         assert self._validation is not None
         self._writer.say(
             "epoch",
@@ -227,7 +221,7 @@ class DenoiserLoop(Loop):
         would have ended without the stop.
         """
         validation = validate(self._network, self._validator)
-        if validation is not None and math.isfinite(validation.rmse):
+        if math.isfinite(validation.rmse):
             self._write_best(validation, self.position.epoch)
 
     def _write_best(self, validation: Validation, epoch: int) -> None:

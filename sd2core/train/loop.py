@@ -51,11 +51,8 @@ class Loop(ABC):
         """Take one step of the optimiser."""
 
     @abstractmethod
-    def check(self) -> dict[str, Any] | None:
-        """Check the model: its ``score``, of which less is better, and what else is to be kept.
-
-        None where the check was given up.
-        """
+    def check(self) -> dict[str, Any]:
+        """Check the model: its ``score``, of which less is better, and what else is to be kept."""
 
     @abstractmethod
     def keep_best(self) -> None:
@@ -106,15 +103,10 @@ class Loop(ABC):
             self.end_epoch()
         return "finished" if self.over else None
 
-    def end_epoch(self) -> bool | None:
-        """Check the model, keep it if it is the best so far, and begin the next epoch.
-
-        True if it is the best; None if the check was given up, and the epoch goes on.
-        """
+    def end_epoch(self) -> bool:
+        """Check the model, keep it if it is the best so far, which is True, and begin the next."""
         position = self.position
         scores = self.check()
-        if scores is None:
-            return None
         best = position.best is None or bool(scores["score"] < position.best["score"])
         if best:
             position.best = {"epoch": position.epoch + 1, **scores}
