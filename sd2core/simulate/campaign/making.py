@@ -8,9 +8,8 @@ import json
 import multiprocessing
 import os
 import signal
-from collections import deque
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -27,9 +26,6 @@ from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.scene import subject_name
 from sd2core.simulate.campaign.takes import Campaign, TakeMaker, motions_of, take_name
 from sd2core.version import __version__
-
-_AHEAD = 3
-"""Takes per process that are handed out before the first of them is written."""
 
 _maker: TakeMaker | None = None
 
@@ -94,11 +90,11 @@ def make_campaign(
     missing = [number for number in numbers if not _written(writer, campaign, *number)]
     done = len(numbers) - len(missing)
     progress(done, len(numbers))
-    made = (
-        _here(campaign, known, missing)
-        if processes == 1
-        else _elsewhere(campaign, errors, missing, processes)
-    )
+    if processes == 1:
+        maker = TakeMaker(campaign, known)
+        made = (maker.make(*number) for number in missing)
+    else:
+        made = _elsewhere(campaign, errors, missing, processes)
     with closing(made):
         for takes in made:
             for take in takes:
@@ -127,19 +123,10 @@ def _written(writer: PairWriter, campaign: Campaign, subject: int, number: int) 
     return wanted <= writer.done
 
 
-def _here(
-    campaign: Campaign, errors: FitErrors, numbers: Sequence[tuple[int, int]]
-) -> Generator[list[Take], None, None]:
-    maker = TakeMaker(campaign, errors)
-    for subject, number in numbers:
-        yield maker.make(subject, number)
-
-
 def _elsewhere(
     campaign: Campaign, errors: Path | None, numbers: Sequence[tuple[int, int]], processes: int
 ) -> Generator[list[Take], None, None]:
-    """Takes in order, made by processes that are a few takes ahead."""
-    waiting = deque(numbers)
+    """Takes in order, made by processes that end at once with whoever asks for them."""
     context = multiprocessing.get_context("spawn")
     others = multiprocessing.active_children()
     with (
@@ -148,12 +135,8 @@ def _elsewhere(
             processes, mp_context=context, initializer=_start, initargs=(campaign, errors)
         ) as pool,
     ):
-        running: deque[Future[list[Take]]] = deque()
         try:
-            while waiting or running:
-                while waiting and len(running) < _AHEAD * processes:
-                    running.append(pool.submit(_make, *waiting.popleft()))
-                yield running.popleft().result()
+            yield from pool.map(_make, *zip(*numbers, strict=True))
         except BrokenProcessPool as error:
             raise Sd2Error(
                 "A process that makes takes has ended by itself",

@@ -12,7 +12,7 @@ motion would be anywhere.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, cast
 
@@ -99,7 +99,6 @@ def radar_target(
     reflectors: tuple[Reflector, ...] = (),
     seed: Sequence[int] = (0,),
     options: TargetOptions | None = None,
-    on_frame: Callable[[], None] = lambda: None,
 ) -> NDArray[np.float32]:
     """Doppler map of a moving mesh by a radar: power, (T, bins), see :data:`REFERENCE_RANGE_M`.
 
@@ -117,8 +116,6 @@ def radar_target(
     seed : sequence of int
         Of phases and noise.
     options : TargetOptions, optional
-    on_frame : callable
-        Called before every frame; may raise to stop.
     """
     options = options or TargetOptions()
     rng = np.random.default_rng(seed)
@@ -134,10 +131,8 @@ def radar_target(
     values = np.empty((mesh.frame_count, axis.bins), np.float32)
     for start in range(0, mesh.frame_count, _BLOCK_FRAMES):
         stop = min(start + _BLOCK_FRAMES, mesh.frame_count)
-        signals = []
-        for frame in range(start, stop):
-            on_frame()
-            signals.append(_echoes(scene, float(mesh.times_s[frame]), phases) + static)
+        times_s = mesh.times_s[start:stop].tolist()
+        signals = [_echoes(scene, time_s, phases) + static for time_s in times_s]
         samples, full_scale = _received(np.array(signals), config, options.link, rng)
         values[start:stop] = _power(samples, chain, weights) * (full_scale**2 / options.looks)
     if options.link is not None:

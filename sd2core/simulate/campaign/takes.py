@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -136,26 +135,8 @@ class TakeMaker:
             for resolution in (TRUE, FITTED)
         }
 
-    def make(
-        self,
-        subject_number: int,
-        number: int,
-        on_frame: Callable[[], None] = lambda: None,
-        *,
-        look: int = 0,
-    ) -> list[Take]:
-        """One take as every placement sees it.
-
-        Parameters
-        ----------
-        subject_number, number : int
-            Of the subject and of the take, from 0 on.
-        on_frame : callable
-            Called before every radar frame; may raise to stop.
-        look : int
-            Other values have the same motion, and a radar with other noise and another rough
-            surface.
-        """
+    def make(self, subject_number: int, number: int) -> list[Take]:
+        """One take as every placement sees it, by the numbers of subject and take from 0 on."""
         campaign = self._campaign
         rngs = [
             np.random.default_rng([campaign.seed, _TAKE, subject_number, number, part])
@@ -206,9 +187,8 @@ class TakeMaker:
                 campaign.synthesis.axis,
                 campaign.synthesis.null_bins,
                 reflectors=setting.reflectors,
-                seed=[*seed, placement, *([look] if look else [])],
+                seed=[*seed, placement],
                 options=target,
-                on_frame=on_frame,
             )
             synthetic = synthetic_map(synthesizer, sensor, limbs=campaign.limbs)
             takes.append(

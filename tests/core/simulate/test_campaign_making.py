@@ -69,15 +69,12 @@ def test_takes_are_of_everybody_in_turn(whole: Path) -> None:
     assert any(take.synthetic.any() and take.radar.any() for take in pairs.takes)
 
 
-def test_another_look_and_a_perfect_fit_are_of_the_same_motion(whole: Path) -> None:
+def test_a_perfect_fit_is_of_the_same_motion(whole: Path) -> None:
     made = read_pairs(whole).takes[0]
     one = TakeMaker(SHORT).make(0, 0)[0]
-    other = TakeMaker(SHORT).make(0, 0, look=1)[0]
-    assert one.radar.tobytes() == made.radar.tobytes() != other.radar.tobytes()
-    assert one.synthetic.tobytes() == other.synthetic.tobytes() != made.synthetic.tobytes()
-    assert one.label.tobytes() == other.label.tobytes() == made.label.tobytes()
-    # The same energy in the mean, but for speckle.
-    assert 0.5 < one.radar.sum() / other.radar.sum() < 2.0
+    assert one.radar.tobytes() == made.radar.tobytes()
+    assert one.synthetic.tobytes() != made.synthetic.tobytes()
+    assert one.label.tobytes() == made.label.tobytes()
 
 
 @pytest.mark.slow
