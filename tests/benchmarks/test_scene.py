@@ -69,6 +69,6 @@ def test_frames_per_second_of_the_image_backend(
     benchmark.extra_info["times_bare_rendering"] = median_s / player.bare_rendering_s()
     picture = player.backend.grab().toImage()
     middle = player.scene.pose.project([player.scene.extent.centre_m])[0]
-    ground = QColor(player.scene.colours.background)
+    ground = QColor(player.scene.colours.backdrop)
     assert picture.pixelColor(round(middle[0]), round(middle[1])) != ground
     player.backend.shut_down()
