@@ -40,14 +40,17 @@ class LabelsEntry(Entry):
         return Labels(self.tracks, self.spans, self.label_set)
 
 
+_DEFAULTS = {field.name: field.default for field in fields(Span)}
+
+
 def span_entry(span: Span, frames: ShownFrames | None = None) -> dict[str, Any]:
     """Encode a span; fields at their defaults are left out."""
     entry: dict[str, Any] = {}
-    for field in fields(span):
-        value = getattr(span, field.name)
-        if value != field.default:
-            entry[field.name] = value
-        if field.name == "end_s" and frames is not None:
+    for name, default in _DEFAULTS.items():
+        value = getattr(span, name)
+        if value != default:
+            entry[name] = value
+        if name == "end_s" and frames is not None:
             entry["frames"] = asdict(frames)
     return entry
 

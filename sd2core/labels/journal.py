@@ -21,8 +21,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import FiniteFloat, NonNegativeInt
+from pydantic_core import to_json
 
-from sd2core.files.atomic import atomic_write, to_json
+from sd2core.files.atomic import atomic_write
 from sd2core.labels.entries import Entry, LabelsEntry, SpanEntry, labels_entry
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, LabelTrack
@@ -93,7 +94,7 @@ def packed(kept: Kept) -> bytes:
         "labels": labels_entry(kept.labels),
         "others": kept.others,
     }
-    payload = to_json(content, separators=(",", ":")).encode()
+    payload = to_json(content)
     return b"%08x %08x %b\n" % (len(payload), zlib.crc32(payload), payload)
 
 
