@@ -89,14 +89,13 @@ def _project(positions, faces, sensor, centre, axes, picture) -> float:  # type:
 
 
 @compiled
-def _draw(picture, faces, closed, depths, facing, drawn, bounds) -> int:  # type: ignore[no-untyped-def]
+def _draw(picture, faces, closed, depths, facing, drawn) -> int:  # type: ignore[no-untyped-def]
     """Draw the nearest depth into each pixel whose centre a triangle covers.
 
     ``picture`` (4, V) holds columns and rows in pixels, ``depths`` infinity where
     there is nothing. ``facing`` (V,) starts as :data:`LOOSE` and receives whether a
     triangle of the vertex faces the sensor, ``drawn`` (F, 3) the triangles that can
-    hide something and ``bounds`` (F, 4) the columns and rows that each touches.
-    Returns how many.
+    hide something. Returns how many.
     """
     x, y, depth = picture[0], picture[1], picture[2]
     count = 0
@@ -119,10 +118,8 @@ def _draw(picture, faces, closed, depths, facing, drawn, bounds) -> int:  # type
             if closed:
                 continue
         drawn[count, 0], drawn[count, 1], drawn[count, 2] = i, j, k
-        # Columns and rows are positive: truncating is rounding down.
-        bounds[count, 0], bounds[count, 1] = int(left), int(right)
-        bounds[count, 2], bounds[count, 3] = int(top), int(bottom)
         count += 1
+        # Columns and rows are positive: truncating is rounding down.
         c0, c1 = int(left + ALMOST_ONE), int(right)
         r0, r1 = int(top + ALMOST_ONE), int(bottom)
         if c0 > c1 or r0 > r1:
@@ -141,17 +138,13 @@ def _draw(picture, faces, closed, depths, facing, drawn, bounds) -> int:  # type
 
 
 @compiled
-def _look_up(  # type: ignore[no-untyped-def]
-    picture, depths, facing, pixel, needed, visible, doubtful, upto
-) -> int:
+def _look_up(picture, depths, facing, pixel, needed, visible, doubtful) -> int:  # type: ignore[no-untyped-def]
     """Compare the needed vertices of one frame with the picture.
 
     ``doubtful`` (V,) receives those that it cannot decide; they count as visible.
-    ``upto`` (resolution + 1, resolution + 1) receives how many of them lie above and
-    left of each pixel's corner. Returns how many there are.
+    Returns how many there are.
     """
     count = 0
-    upto[:] = 0
     for v in range(needed.shape[0]):
         doubtful[v] = 0
         if needed[v] == 0:
@@ -177,29 +170,7 @@ def _look_up(  # type: ignore[no-untyped-def]
                 if depth <= surface + ON_IT_PIXELS * one:
                     continue
         doubtful[v] = 1
-        upto[row + 1, column + 1] += 1
         count += 1
-    for row in range(1, upto.shape[0]):
-        along = 0
-        for column in range(1, upto.shape[1]):
-            along += upto[row, column]
-            upto[row, column] = upto[row - 1, column] + along
-    return count
-
-
-@compiled
-def _beside_doubt(drawn, bounds, triangles, upto) -> int:  # type: ignore[no-untyped-def]
-    """Move triangles on a pixel with a doubtful vertex to the front; returns their number."""
-    count = 0
-    for f in range(triangles):
-        left, right, top, bottom = bounds[f, 0], bounds[f, 1] + 1, bounds[f, 2], bounds[f, 3] + 1
-        if upto[bottom, right] - upto[bottom, left] > upto[top, right] - upto[top, left]:
-            drawn[count, 0], drawn[count, 1], drawn[count, 2] = (
-                drawn[f, 0],
-                drawn[f, 1],
-                drawn[f, 2],
-            )
-            count += 1
     return count
 
 
@@ -241,8 +212,6 @@ def depth_visibility_kernel(
     depths = np.empty((resolution, resolution), np.float64)
     facing = np.empty(vertices, np.uint8)
     drawn = np.empty(faces.shape, np.int32)
-    bounds = np.empty((faces.shape[0], 4), np.int32)
-    upto = np.empty((resolution + 1, resolution + 1), np.int32)
     doubtful = np.empty(vertices, np.uint8)
     axes = np.empty((3, 3), np.float64)
     centre = np.empty(3, np.float64)
@@ -273,11 +242,10 @@ def depth_visibility_kernel(
             y[v] = (y[v] - ymin) * per_metre + 0.5
         depths[:] = np.inf
         facing[:] = LOOSE
-        triangles = _draw(picture, faces, closed, depths, facing, drawn, bounds)
-        count = _look_up(picture, depths, facing, pixel, needed[t], visible[t], doubtful, upto)
+        triangles = _draw(picture, faces, closed, depths, facing, drawn)
+        count = _look_up(picture, depths, facing, pixel, needed[t], visible[t], doubtful)
         if count == 0:
             continue
-        triangles = _beside_doubt(drawn, bounds, triangles, upto)
         for v in range(vertices):
             image[0, v], image[1, v], depth[v] = x[v], y[v], picture[2, v]
             for axis in range(3):
