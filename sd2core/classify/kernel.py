@@ -55,12 +55,7 @@ class KernelClassifier(Classifier):
         """Score the next frames."""
         seen = torch.cat([state, features], dim=1)
         kept = seen[:, seen.shape[1] - self._frames + 1 :]
-        scores = []
-        for start in range(0, features.shape[1], _BLOCK):
-            stop = min(start + _BLOCK, features.shape[1])
-            part = seen[:, start : stop + self._frames - 1]
-            scores.append(self._likeness(self._described(part)) @ self.weights)
-        return _SHARPNESS * torch.cat(scores, dim=1), kept
+        return _SHARPNESS * (self._likeness(self._described(seen)) @ self.weights), kept
 
     def fit(
         self,

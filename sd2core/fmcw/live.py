@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.chain import Chain, ProcessingOptions
+from sd2core.fmcw.chain import FrameChain, ProcessingOptions
 from sd2core.fmcw.processing import binned, weights_of
-from sd2core.io.radar.capture import LazySamples, RadarCapture
+from sd2core.io.radar.capture import RadarCapture
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -48,11 +48,8 @@ class LiveMap:
                 "The clutter filter is 'moving', which averages over later frames",
                 "a filter that a frame is enough for: none, mean or regression",
             )
-        self.axis = axis
-        shape = (1, *like.samples.shape[1:])
-        self._frame = np.zeros(shape, like.samples.dtype)
-        newest = LazySamples(shape, like.samples.dtype, lambda _: self._frame)
-        self._chain = Chain(replace(like, samples=newest, timebase=Timebase([0.0])), options)
+        self.axis, self._like = axis, like
+        self._chain = FrameChain(like.config, options)
         self._weights = weights_of(axis, self._chain)
 
     def column(self, frame: NDArray[Any]) -> NDArray[np.float32]:
@@ -60,5 +57,6 @@ class LiveMap:
 
         Raises Sd2Error if a sample is none, as :meth:`RadarCapture.read` does.
         """
-        self._frame = frame
-        return binned(self._weights, self._chain.doppler_power(0, 1))[:, 0]
+        alone = replace(self._like, samples=frame, timebase=Timebase([0.0]))
+        signal = self._chain.without_own_clutter(alone.read(0, 1))
+        return binned(self._weights, self._chain.power_over_doppler(signal))[:, 0]

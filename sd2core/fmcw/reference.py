@@ -28,12 +28,6 @@ class Converged:
     pieces: tuple[int, ...]  # Triangles per facet that were tried: 1, 4, 16 …
     # L1 of the change of :func:`doppler_marginal` from one to the next of these.
     changes: tuple[float, ...]
-    tolerance: float  # Limit that the last change was to stay below.
-
-    @property
-    def converged(self) -> bool:
-        """True if the last change was below the tolerance."""
-        return not self.changes or self.changes[-1] <= self.tolerance
 
 
 def converged_frame(
@@ -72,7 +66,7 @@ def converged_frame(
         signal = finer
         if changes[-1] <= tolerance:
             break
-    return Converged(signal, tuple(pieces), tuple(changes), tolerance)
+    return Converged(signal, tuple(pieces), tuple(changes))
 
 
 def doppler_marginal(signal: BeatSignal) -> NDArray[np.float64]:

@@ -63,7 +63,6 @@ def test_large_facets_converge_to_what_small_ones_give(motion: str) -> None:
         for cells in (4, 16)
     ]
     for one in found:
-        assert one.converged
         assert one.changes[-1] <= 1e-3
         assert one.pieces == tuple(4**k for k in range(len(one.changes) + 1))
     coarse, fine = (doppler_marginal(one.signal) for one in found)
@@ -79,16 +78,17 @@ def test_real_samples_are_the_real_part_of_complex_ones() -> None:
     assert np.abs(both.signal.imag).max() > 0.5 * np.abs(real.signal).max()
 
 
-def test_what_does_not_converge_says_so() -> None:
+def test_what_does_not_converge_says_how_far_it_is() -> None:
     scene = WaveScene(flapping(), RADAR, CAMERA)
     one = converged_frame(scene, 0.1, tolerance=1e-9, most_cuts=1)
-    assert (one.pieces, one.converged) == ((1, 4), False)
+    assert one.pieces == (1, 4)
+    assert one.changes[-1] > 1e-9
 
 
 def test_a_rough_surface_is_summed_as_it_is() -> None:
     scene = WaveScene(flapping(), RADAR, CAMERA, wave=WaveOptions(coherent=False), seed=3)
     one = converged_frame(scene, 0.1)
-    assert (one.pieces, one.changes, one.converged) == ((1,), (), True)
+    assert (one.pieces, one.changes) == ((1,), ())
     position, velocity = scene.scene.moving(0.1)
     expected = direct(scene.echoes(position, velocity, None), RADAR).real
     np.testing.assert_allclose(one.signal[0], expected, atol=1e-12 * np.abs(expected).max())
