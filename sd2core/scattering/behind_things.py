@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.exact import frame_scratch, see_frame
+from sd2core.scattering.exact import see_frame
 
 _ROOM = 1e-5
 """Tangent by which pictures are taken to be larger than they are, for roundings."""
@@ -95,7 +95,7 @@ def _hide_behind_kernel(  # type: ignore[no-untyped-def]
     """Do :func:`hide_behind`; ``counts`` (0, W) for all."""
     vertices, width = points.shape[2], surface.shape[2]
     room = vertices + width
-    scratch, marked = frame_scratch(room), np.zeros(room, np.uint8)
+    marked = np.zeros(room, np.uint8)
     both, seen = np.empty((3, room), np.float32), np.empty(room, np.uint8)
     asked, kept = np.empty(vertices, np.int32), np.empty_like(faces)
     box_m = np.empty((2, 3), np.float64)
@@ -135,7 +135,7 @@ def _hide_behind_kernel(  # type: ignore[no-untyped-def]
                 left += (counts[t, i] | counts[t, j] | counts[t, k]) != 0
             hiding = kept[:left]
         x, y, z = both[0, : width + count], both[1, : width + count], both[2, : width + count]
-        see_frame(x, y, z, hiding, places_m[t], marked, count, scratch, seen)
+        see_frame(x, y, z, hiding, places_m[t], marked, count, seen)
         for number in range(count):
             visible[t, asked[number]] = seen[width + number]
 

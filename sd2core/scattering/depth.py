@@ -23,7 +23,6 @@ from sd2core.scattering.exact import (
     WIDEST,
     axes_along,
     exact_visibility_kernel,
-    search_scratch,
     search_view,
     surface_box,
 )
@@ -218,7 +217,6 @@ def depth_visibility_kernel(
     # Of the search.
     towards = np.empty((3, vertices), np.float64)
     image, depth = np.empty((2, vertices), np.float32), np.empty(vertices, np.float32)
-    scratch = search_scratch(vertices)
     for t in range(first, last):
         wanted = False
         for v in range(vertices):
@@ -252,7 +250,7 @@ def depth_visibility_kernel(
                 towards[axis, v] = sensor[axis] - positions[t, axis, v]
         search_view(
             positions[t, 0], positions[t, 1], positions[t, 2], drawn[:triangles], towards, axes,
-            np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth, scratch,
+            np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth,
             visible[t],
         )  # fmt: skip
 

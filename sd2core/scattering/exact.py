@@ -40,8 +40,6 @@ _MAX_COLUMNS, _MAX_ROWS = 1024, 192
 
 Beginning a row costs more than passing over a vertex: few rows, finely divided."""
 
-MAX_CELLS = _MAX_COLUMNS * _MAX_ROWS
-
 LANES = 8
 """Vertices met at a time: as many as a vector register holds single-precision numbers."""
 
@@ -144,18 +142,8 @@ def _proposed(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def search_scratch(vertices):  # type: ignore[no-untyped-def]
-    """Work space of :func:`search_view` for so many vertices."""
-    cell, start = np.empty(vertices, np.int32), np.empty(MAX_CELLS + 2, np.int32)
-    order = np.empty(vertices + LANES, np.int32)
-    sorted_image = np.empty((2, vertices + LANES), np.float32)
-    sorted_depth = np.empty(vertices + LANES, np.float32)
-    return cell, start, order, sorted_image, sorted_depth, np.empty(vertices, np.uint8)
-
-
-@compiled
 def search_view(  # type: ignore[no-untyped-def]
-    x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, scratch, visible,
+    x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, visible,
 ) -> None:  # fmt: skip
     """Set ``visible`` to 0 for the owned vertices that a triangle hides in one view.
 
@@ -181,12 +169,8 @@ def search_view(  # type: ignore[no-untyped-def]
         Image coordinates of each vertex.
     depth : float32 array, shape (V,)
         Depth of each vertex.
-    scratch : tuple of arrays
-        Of :func:`search_scratch`.
     visible : uint8 array, shape (V,)
     """
-    # Sorted arrays have room for some lanes more.
-    cell, start, order, sorted_image, sorted_depth, hidden = scratch
     vertices = depth.shape[0]
     xmin = ymin = np.float32(np.inf)
     xmax = ymax = dmax = np.float32(-np.inf)
@@ -204,6 +188,12 @@ def search_view(  # type: ignore[no-untyped-def]
     columns = min(_MAX_COLUMNS, max(4, int(_COLUMNS_PER_ROOT * np.sqrt(owned_count))))
     rows = min(_MAX_ROWS, max(4, int(_ROWS_PER_ROOT * np.sqrt(owned_count))))
     wide, high = xmax - xmin, ymax - ymin
+    cell, start = np.empty(vertices, np.int32), np.empty(columns * rows + 2, np.int32)
+    # Sorted arrays have room for some lanes more.
+    order = np.empty(owned_count + LANES, np.int32)
+    sorted_image = np.empty((2, owned_count + LANES), np.float32)
+    sorted_depth = np.empty(owned_count + LANES, np.float32)
+    hidden = np.empty(owned_count, np.uint8)
     xscale = np.float32(columns) / wide if wide > 0 else np.float32(0)
     yscale = np.float32(rows) / high if high > 0 else np.float32(0)
 
@@ -294,14 +284,6 @@ def search_view(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def frame_scratch(vertices):  # type: ignore[no-untyped-def]
-    """Work space of :func:`see_frame` for so many vertices."""
-    g, image = np.empty((3, vertices), np.float64), np.empty((2, vertices), np.float32)
-    depth, owned = np.empty(vertices, np.float32), np.empty(vertices, np.uint8)
-    return g, image, depth, owned, search_scratch(vertices), np.empty((3, 3), np.float64)
-
-
-@compiled
 def surface_box(x, y, z, faces):  # type: ignore[no-untyped-def]
     """Lowest and highest corner of a surface, (3,) each; a loose vertex may be anywhere."""
     used = np.zeros(x.shape[0], np.uint8)
@@ -320,7 +302,7 @@ def surface_box(x, y, z, faces):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None:  # type: ignore[no-untyped-def]
+def see_frame(x, y, z, faces, sensor, needed, count, visible) -> None:  # type: ignore[no-untyped-def]
     """Set ``visible`` of the needed vertices of one frame that no triangle hides.
 
     Parameters
@@ -335,14 +317,12 @@ def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None: 
         Which vertices to test.
     count : int
         Number of these.
-    scratch : tuple of arrays
-        Of :func:`frame_scratch`, for so many vertices or more.
     visible : uint8 array, shape (V,)
         Written where needed.
     """
     vertices = x.shape[0]
-    g, image, depths, owned, searched, axes = scratch
-    depth = depths[:vertices]
+    g, axes = np.empty((3, vertices), np.float64), np.empty((3, 3), np.float64)
+    image, depth = np.empty((2, vertices), np.float32), np.empty(vertices, np.float32)
     for v in range(vertices):
         if needed[v]:
             visible[v] = 1
@@ -373,10 +353,11 @@ def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None: 
     if narrow:
         search_view(
             x, y, z, faces, g, axes, np.float32(-np.inf), contact, needed, count, image,
-            depth, searched, visible,
+            depth, visible,
         )  # fmt: skip
         return
 
+    owned = np.empty(vertices, np.uint8)
     for side in range(6):
         sign = 1.0 - 2.0 * (side % 2)
         main = side // 2
@@ -400,7 +381,7 @@ def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None: 
             continue
         search_view(
             x, y, z, faces, g, axes, np.float32(contact), contact, owned, mine, image,
-            depth, searched, visible,
+            depth, visible,
         )  # fmt: skip
 
 
@@ -431,14 +412,13 @@ def exact_visibility_kernel(
     visible : uint8 array, shape (n, V)
         Written where needed.
     """
-    scratch = frame_scratch(positions.shape[2])
     for t in range(first, last):
         count = 0
         for v in range(positions.shape[2]):
             count += needed[t, v] != 0
         if count > 0:
             x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
-            see_frame(x, y, z, faces, sensor, needed[t], count, scratch, visible[t])
+            see_frame(x, y, z, faces, sensor, needed[t], count, visible[t])
 
 
 @compiled
