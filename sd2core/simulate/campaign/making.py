@@ -6,20 +6,21 @@ import hashlib
 import itertools
 import json
 import multiprocessing
-import os
 import signal
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
+
+from threadpoolctl import threadpool_limits
 
 from sd2core.body.shape import ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.pairs.summary import TakeKey
-from sd2core.processes import ONE_THREAD, end_with_parent
+from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
@@ -129,12 +130,7 @@ def _elsewhere(
     """Takes in order, made by processes that end at once with whoever asks for them."""
     context = multiprocessing.get_context("spawn")
     others = multiprocessing.active_children()
-    with (
-        _one_thread_each(),
-        ProcessPoolExecutor(
-            processes, mp_context=context, initializer=_start, initargs=(campaign, errors)
-        ) as pool,
-    ):
+    with ProcessPoolExecutor(processes, context, _start, (campaign, errors)) as pool:
         try:
             yield from pool.map(_make, *zip(*numbers, strict=True))
         except BrokenProcessPool as error:
@@ -154,26 +150,12 @@ def _elsewhere(
             raise
 
 
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Processes that are started meanwhile multiply matrices on one thread."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
 def _start(campaign: Campaign, errors: Path | None) -> None:
     global _maker
     # Ctrl+C goes to all of them; the parent sees to the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
+    threadpool_limits(limits=1, user_api="blas")  # the processes share the cores as they are
     _maker = TakeMaker(campaign, FitErrors.load(errors))
 
 
