@@ -3,9 +3,9 @@
 Each frame's triangles are drawn into a square picture of the depths that the
 sensor sees. It decides for the vertices that lie clearly on or clearly behind the
 surface in it; a vertex beside a rim, or close beneath another surface, is decided
-by exact's own search, among the triangles there. A vertex counts only when one of
-its triangles faces the sensor, and of a closed surface only such triangles are
-drawn: faces must be oriented outwards (see docs/decisions/0010).
+by exact's own search. A vertex counts only when one of its triangles faces the
+sensor, and of a closed surface only such triangles are drawn: faces must be
+oriented outwards (see docs/decisions/0010).
 
 Where one image plane does not suffice (the body more than 63 degrees off the axis,
 or around the sensor), the frame is decided exactly.
