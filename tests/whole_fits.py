@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.fit import Fitting, Lift
+from sd2core.body.fit import Fitting
 from sd2core.body.fitted import BodyFit, FittedMotion, Pose, mean_over_limbs
+from sd2core.body.lifter import LiftedTrack
 from sd2core.body.model import Resolution
 from sd2core.body.track import LandmarkTrack
 from sd2core.mesh.sequence import MeshSequence
@@ -21,12 +22,12 @@ def fit_body(
     camera: PinholeCamera,
     *,
     stature_m: float | None = None,
-    lift: Lift | None = None,
+    lifted: LiftedTrack | None = None,
     workspace: Path | None = None,
     progress: Progress = silent,
 ) -> BodyFit:
-    """Fit a body to landmarks, whose depth ``lift`` gives, by default the bundled lifter."""
-    parts = list(Fitting(track, camera, stature_m, lift, workspace).finished(progress))
+    """Fit a body to landmarks, whose depth the bundled lifter gives where it is not given."""
+    parts = list(Fitting(track, camera, stature_m, lifted, workspace).finished(progress))
     arrays = {
         field.name: np.concatenate([getattr(part, field.name) for part in parts])
         for field in fields(BodyFit)
@@ -40,7 +41,7 @@ def mesh_of(fit: BodyFit, resolution: Resolution) -> MeshSequence:
     motion = FittedMotion(
         timebase=fit.timebase,
         shape=fit.shape,
-        poses=Pose(fit.turns, fit.translation_m).at,
+        pose=Pose(fit.turns, fit.translation_m),
         present=fit.present,
         along_sd_mps=mean_over_limbs(fit.along_sd_mps),
         across_sd_mps=mean_over_limbs(fit.across_sd_mps),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,8 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.body.evidence import Evidence, evidence_of, joined, sight_of, trust_of
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import BodyFit, FittedMotion, mean_over_limbs
-from sd2core.body.initial import initial_pose
-from sd2core.body.lifter import Lifted, LiftedInParts, LiftedTrack, Lifter
+from sd2core.body.initial import Pose, initial_pose
+from sd2core.body.lifter import LiftedTrack, Lifter
 from sd2core.body.limbs import LIMBS
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
@@ -25,9 +26,6 @@ from sd2core.body.solve import ROUNDS, solve, solve_stills
 from sd2core.body.track import LANDMARKS, PART_FRAMES, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
-
-Lift = Callable[[LandmarkTrack, PinholeCamera], Lifted]
-
 
 _SEEN = 0.5
 """Sight from which on a landmark counts as seen."""
@@ -79,7 +77,7 @@ def fit_motion(
     return FittedMotion(
         timebase=track.timebase,
         shape=part.shape,
-        poses=fitting.windows.poses,
+        pose=fitting.windows.pose(),
         present=track.present,
         along_sd_mps=along_mps,
         across_sd_mps=across_mps,
@@ -97,7 +95,7 @@ class Fitting:
         track: LandmarkTrack,
         camera: PinholeCamera,
         stature_m: float | None,
-        lift: Lift | None,
+        lifted: LiftedTrack | None,
         workspace: Path | None,
     ) -> None:
         stature_m = DEFAULT_STATURE_M if stature_m is None else stature_m
@@ -105,24 +103,24 @@ class Fitting:
         if not track.present.any():
             raise Sd2Error("No frame of the video shows a person", "at least one")
         self._track, self._camera, self._stature_m = track, camera, stature_m
-        self._lifter = Lifter.load()
-        self._lifted: Lifted
-        if lift is None:
-            self._lifted = LiftedInParts(self._lifter, track, camera)
-        else:
-            self._lifted = lift(track, camera)
+        self._lifter, self._lifted = Lifter.load(), lifted
         self.windows = Windows(track.present, ArrayStore(workspace))
 
     def finished(self, progress: Progress) -> Iterator[BodyFit]:
-        """Fits of successive stretches, each as soon as its pose is final."""
+        """Fits of successive stretches, once the pose of all is known."""
         spans = self.windows.spans
         looked = sum(1 for _ in parts(len(self._track)))
         total = looked + len(spans) * ROUNDS
+        if self._lifted is None:
+
+            def looking(frames: int, of: int) -> None:
+                progress(looked * frames // of, total)
+
+            self._lifted = self._lifter.lift(self._track, self._camera, looking)
         space = ShapeSpace()
         keypoints = KeypointSpace(space)
-        shape = self._shape(space, keypoints, lambda number: progress(number, total))
+        shape = self._shape(space, keypoints)
         rig = keypoints.rig(shape)
-        done = 0
         for number in range(len(spans)):
             progress(looked + number * ROUNDS, total)
 
@@ -130,27 +128,22 @@ class Fitting:
                 progress(looked + number * ROUNDS + rounds, total)
 
             self._solve(rig, number, tick)
-            final = spans[number + 1][0] if number + 1 < len(spans) else len(self._track)
-            for start in range(done, final, _FINISHED_FRAMES):
-                yield self._finished(rig, shape, start, min(start + _FINISHED_FRAMES, final))
-            done = final
+        pose = self.windows.pose()
+        for first, last in pairwise([0, *(start for start, *_ in spans[1:]), len(self._track)]):
+            for start in range(first, last, _FINISHED_FRAMES):
+                yield self._finished(rig, shape, pose, start, min(start + _FINISHED_FRAMES, last))
         progress(total, total)
 
     def _part(self, start: int, stop: int) -> tuple[Evidence, LandmarkTrack, LiftedTrack]:
         """Evidence of frames ``start`` to ``stop``, with its track and lifted track."""
+        assert self._lifted is not None
         track, lifted = self._track.part(start, stop), self._lifted.part(start, stop)
         return evidence_of(track, lifted, self._camera, self._stature_m), track, lifted
 
-    def _chosen(
-        self, frames: NDArray[np.intp], looked: Callable[[int], None]
-    ) -> tuple[Evidence, Floats]:
-        """Evidence of some frames (ascending), and the trust in their landmarks (n, 33).
-
-        ``looked`` is called with the number of parts that were read.
-        """
+    def _chosen(self, frames: NDArray[np.intp]) -> tuple[Evidence, Floats]:
+        """Evidence of some frames (ascending), and the trust in their landmarks (n, 33)."""
         pieces, trust = [], []
-        for number, (start, stop) in enumerate(parts(len(self._track))):
-            looked(number)
+        for start, stop in parts(len(self._track)):
             rows = frames[(frames >= start) & (frames < stop)] - start
             if len(rows):
                 evidence, track, _ = self._part(start, stop)
@@ -166,9 +159,7 @@ class Fitting:
         first = initial_pose(rig, part.points_m, trust_of(track))
         self.windows.keep(part, solve(rig, part, first, tick))
 
-    def _shape(
-        self, space: ShapeSpace, keypoints: KeypointSpace, looked: Callable[[int], None]
-    ) -> BodyShape:
+    def _shape(self, space: ShapeSpace, keypoints: KeypointSpace) -> BodyShape:
         """Bone lengths from evenly chosen frames, then girth from those with outlines."""
         track = self._track
         present = track.present & ~track.bridged
@@ -177,7 +168,7 @@ class Fitting:
         outlined_frames = track.silhouette_frames[outlined]
         frames = _thinned(np.flatnonzero(present), PART_FRAMES)
         known = np.union1d(frames, outlined_frames)
-        evidence, trust = self._chosen(known, looked)
+        evidence, trust = self._chosen(known)
         rows = np.searchsorted(known, frames)
         shape, spread = shape_of_lengths(
             space, keypoints, evidence[rows].points_m, trust[rows], self._stature_m
@@ -199,11 +190,11 @@ class Fitting:
         outlines = [mask >= _MASK_SURE for mask in track.silhouettes[outlined]]
         return shape_of_outlines(space, shape, spread, transforms_of, self._camera, outlines)
 
-    def _finished(self, rig: Rig, shape: BodyShape, start: int, stop: int) -> BodyFit:
+    def _finished(self, rig: Rig, shape: BodyShape, whole: Pose, start: int, stop: int) -> BodyFit:
         evidence, track, lifted = self._part(start, stop)
         before = min(start, 1)
-        frames = np.arange(start - before, stop)
-        pose = self.windows.poses(frames)
+        frames = slice(start - before, stop)
+        pose = whole.at(frames)
         keypoints_m = rig.keypoints.positions(rig.transforms(*pose))
         fast_mps = speed_mps(keypoints_m, self._track.timebase.times_s[frames])[before:]
         pose, keypoints_m = pose.at(slice(before, None)), keypoints_m[before:]

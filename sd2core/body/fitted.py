@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +19,6 @@ from sd2core.mesh.made_vertices import MadeVertices
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.timebase import Timebase
-
-Poses = Callable[[NDArray[np.intp]], Pose]
-"""Gives the pose in each of some frames (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +50,11 @@ class BodyFit:
 
 @dataclass(frozen=True, eq=False)
 class FittedMotion:
-    """A person's shape and motion in a clip of any length; poses are read as they are needed."""
+    """A person's shape and motion in a clip of any length."""
 
     timebase: Timebase
     shape: BodyShape
-    poses: Poses
+    pose: Pose  # held in empty frames
     present: NDArray[np.bool_]
     along_sd_mps: NDArray[np.float32]  # (T, L) of BodyFit, mean over each limb's landmarks
     across_sd_mps: NDArray[np.float32]  # (T, L)
@@ -73,7 +69,7 @@ class FittedMotion:
         rig = KeypointSpace(space).rig(self.shape)
         limbs = vertex_limbs(body)
         return MeshSequence(
-            fitted_vertices(body, rig, len(self.timebase), self.poses),
+            fitted_vertices(body, rig, self.pose),
             body.faces,
             self.timebase,
             present=self.present.copy(),
@@ -81,15 +77,15 @@ class FittedMotion:
         )
 
 
-def fitted_vertices(body: Body, rig: Rig, frames: int, poses: Poses) -> MadeVertices:
-    """Vertices (T, V, 3) of a body in so many poses, float32, posed when they are read."""
+def fitted_vertices(body: Body, rig: Rig, pose: Pose) -> MadeVertices:
+    """Vertices (T, V, 3) of a body, float32, posed when they are read."""
 
     def made(rows: NDArray[np.intp]) -> NDArray[np.float32]:
-        pose = poses(rows)
-        rotations = rig.body_rotations(pose.turns)
-        return pose_vertices(body, body.skeleton.transforms(rotations, pose.translation_m))
+        turns, translation_m = pose.at(rows)
+        transforms = body.skeleton.transforms(rig.body_rotations(turns), translation_m)
+        return pose_vertices(body, transforms)
 
-    return MadeVertices((frames, len(body.vertices_m), 3), np.float32, made)
+    return MadeVertices((len(pose.turns), len(body.vertices_m), 3), np.float32, made)
 
 
 def mean_over_limbs(landmarks: Floats) -> NDArray[np.float32]:

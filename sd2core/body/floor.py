@@ -13,7 +13,7 @@ import numpy as np
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.evidence import evidence_of, sight_of
-from sd2core.body.lifter import FEET, LiftedInParts, Lifter
+from sd2core.body.lifter import FEET, Lifter
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import DEFAULT_STATURE_M
 from sd2core.body.track import LANDMARK, LandmarkTrack, parts
@@ -47,7 +47,7 @@ class StandingFeet:
 
 def standing_feet(track: LandmarkTrack, camera: PinholeCamera) -> StandingFeet | None:
     """Places of the feet on the floor; None where they are hardly seen."""
-    lifted = LiftedInParts(Lifter.load(), track, camera)
+    lifted = Lifter.load().lift(track, camera)
     points, downs = [], []
     for start, stop in parts(len(track)):
         part, depths = track.part(start, stop), lifted.part(start, stop)

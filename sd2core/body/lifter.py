@@ -1,16 +1,15 @@
 """Depth and motion of landmarks, and where they really are in the picture, by a small network.
 
-The network was trained on simulated people (decision 18); here it only runs, on NumPy. Tracks
-of any length are lifted in blocks, as they are read.
+The network was trained on simulated people (decision 18); here it only runs, on NumPy, over
+blocks of a long track.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +40,7 @@ from sd2core.body.track import (
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import open_bundled_arrays, resource_path
 from sd2core.mesh.presence import runs
+from sd2core.progress import Progress, silent
 
 Singles = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -101,13 +101,6 @@ class LiftedTrack:
         return LiftedTrack(**{name: values[start:stop] for name, values in vars(self).items()})
 
 
-class Lifted(Protocol):
-    """A lifted track that need not be in memory as a whole."""
-
-    def part(self, start: int, stop: int) -> LiftedTrack:
-        """Frames ``start`` to ``stop``."""
-
-
 @dataclass(frozen=True, eq=False)
 class Lifter:
     """A trained network, and how well its outputs and the fits made of them are known."""
@@ -141,6 +134,36 @@ class Lifter:
         """
         logarithm = np.log(fit_law_terms(lifted_mps, speed_mps)) @ self.fit_law[:2]
         return np.asarray(np.exp(logarithm + self.fit_law[2:]), np.float64)
+
+    def lift(
+        self, track: LandmarkTrack, camera: PinholeCamera, progress: Progress = silent
+    ) -> LiftedTrack:
+        """Lift a track of any length; ``progress`` counts frames.
+
+        Raises Sd2Error if the camera's picture has another size than the track's.
+        """
+        if (camera.width, camera.height) != (track.width, track.height):
+            raise Sd2Error(
+                f"The camera takes pictures of {camera.width} × {camera.height}",
+                f"{track.width} × {track.height}, as the landmarks were found in",
+            )
+        none = vars(_lifted(np.empty((0, OUTPUTS)), np.nan))
+        whole = {
+            name: np.full((len(track), *values.shape[1:]), np.nan) for name, values in none.items()
+        }
+        for first, last in runs(track.present):
+            stretch = _Stretch(track.part(first, last), camera, self.network.reach + 2)
+            # Of a stretch that is one block, the block itself.
+            sample = None if len(stretch.blocks) == 1 else stretch.sample()
+            for start, stop in stretch.blocks:
+                progress(first + start, len(track))
+                view = stretch.view(start, stop)
+                known = view.seen if sample is None else sample
+                outputs = self.outputs(view.seen, known)
+                raw = interpolated(outputs, view.place - view.ticks[0])
+                for name, values in vars(_lifted(raw, float(typical_size(known.slopes)))).items():
+                    whole[name][first + start : first + stop] = values
+        return LiftedTrack(**whole)
 
     def outputs(self, seen: Seen, sample: Seen | None = None) -> Singles:
         """Calibrated outputs (T, OUTPUTS) of one stretch, velocities in full.
@@ -198,17 +221,8 @@ def spread(logarithm: NDArray[np.floating]) -> Floats:
     return np.asarray(np.exp(np.clip(logarithm, *LOG_SIGMA)))
 
 
-class _Block(NamedTuple):
-    """Frames that are lifted together, of a stretch with a person throughout."""
-
-    first: int
-    start: int
-    stop: int
-    last: int
-
-
 class _View(NamedTuple):
-    """A block resampled to the network's rate."""
+    """A block of a stretch resampled to the network's rate."""
 
     seen: Seen
     ticks: NDArray[np.intp]  # (n,) numbers of these moments, from the beginning of the stretch
@@ -216,79 +230,48 @@ class _View(NamedTuple):
     end: float  # where the frames of the next block begin
 
 
-class LiftedInParts:
-    """Track lifted in blocks as it is read; see :class:`Lifted`.
+class _Stretch:
+    """Frames with a person throughout, which are lifted in blocks, as much around them as matters.
 
-    Raises Sd2Error if the camera's picture has another size than the track's.
+    ``reach`` is the number of ticks around a block that matter to it.
     """
 
-    def __init__(self, lifter: Lifter, track: LandmarkTrack, camera: PinholeCamera) -> None:
-        if (camera.width, camera.height) != (track.width, track.height):
-            raise Sd2Error(
-                f"The camera takes pictures of {camera.width} × {camera.height}",
-                f"{track.width} × {track.height}, as the landmarks were found in",
-            )
-        self._lifter, self._track, self._camera = lifter, track, camera
-        self._blocks = [
-            _Block(first, first + start, first + stop, last)
-            for first, last in runs(track.present)
-            for start, stop in parts(last - first)
-        ]
-        self._lifted = lru_cache(maxsize=2)(self._lift)
-        self._sample = lru_cache(maxsize=1)(self._sampled)
+    def __init__(self, track: LandmarkTrack, camera: PinholeCamera, reach: int) -> None:
+        self.blocks = [*parts(len(track))]
+        self._track, self._camera, self._reach = track, camera, reach
+        times_s = track.timebase.times_s
+        self._same = nearly_at_rate(times_s)
+        self._place = (times_s - times_s[0]) * RATE_HZ
+        if self._same:
+            self._place = np.arange(len(track), dtype=np.float64)
 
-    def part(self, start: int, stop: int) -> LiftedTrack:
-        """Frames ``start`` to ``stop``; NaN without a person."""
-        raw, size = np.full((stop - start, OUTPUTS), np.nan), np.full(stop - start, np.nan)
-        for block in self._blocks:
-            first, last = max(block.start, start), min(block.stop, stop)
-            if first < last:
-                outputs, typical = self._lifted(block)
-                size[first - start : last - start] = typical
-                raw[first - start : last - start] = outputs[first - block.start :][: last - first]
-        return _lifted(raw, size)
-
-    def _lift(self, block: _Block) -> tuple[Floats, float]:
-        """Outputs of a block, and the typical size in its stretch."""
-        view = self._view(block)
-        # Of a stretch that is one block, the block itself.
-        whole = (block.start, block.stop) == (block.first, block.last)
-        sample = view.seen if whole else self._sample(block.first, block.last)
-        outputs = self._lifter.outputs(view.seen, sample)
-        size = float(typical_size(sample.slopes))
-        return interpolated(outputs, view.place - view.ticks[0]), size
-
-    def _sampled(self, first: int, last: int) -> Seen:
+    def sample(self) -> Seen:
         """Ticks of a long stretch, evenly spread."""
-        blocks = [block for block in self._blocks if first <= block.start < last]
-        every = -(-(last - first) // PART_FRAMES)
+        every = -(-len(self._track) // PART_FRAMES)
         seen = []
-        for block in blocks:
-            view = self._view(block)
+        for start, stop in self.blocks:
+            view = self.view(start, stop)
             own = (view.ticks >= view.place[0]) & (view.ticks < view.end)
             rows = np.flatnonzero(own & (view.ticks % every == 0))
             seen.append([np.asarray(values)[rows] for values in view.seen])
         return Seen(*(np.concatenate(values) for values in zip(*seen, strict=True)))
 
-    def _view(self, block: _Block) -> _View:
-        """A block at the network's rate, with as much around it as matters."""
-        times_s = self._track.timebase.times_s[block.first : block.last]
-        frames, same = len(times_s), nearly_at_rate(times_s)
-        place = np.arange(frames, dtype=np.float64) if same else (times_s - times_s[0]) * RATE_HZ
-        inner = place[block.start - block.first : block.stop - block.first]
-        end = np.inf if block.stop == block.last else place[block.stop - block.first]
-        reach = self._lifter.network.reach + 2
+    def view(self, start: int, stop: int) -> _View:
+        """A block at the network's rate."""
+        place, frames = self._place, len(self._track)
+        inner = place[start:stop]
+        end = np.inf if stop == frames else place[stop]
         ticks = np.arange(
-            max(int(inner[0]) - reach, 0),
-            min(int(inner[-1]) + 1 + reach, int(place[-1] + 1e-6)) + 1,
+            max(int(inner[0]) - self._reach, 0),
+            min(int(inner[-1]) + 1 + self._reach, int(place[-1] + 1e-6)) + 1,
         )
-        if same:
+        if self._same:
             first, last = int(ticks[0]), int(ticks[-1]) + 1
         else:
             first = max(int(np.searchsorted(place, ticks[0] - 1)) - _BESIDE, 0)
             last = min(int(np.searchsorted(place, ticks[-1] + 1)) + _BESIDE, frames)
-        seen = _seen(self._track.part(block.first + first, block.first + last), self._camera)
-        if not same:
+        seen = _seen(self._track.part(first, last), self._camera)
+        if not self._same:
             near = place[first:last]
             seen = Seen(*(resampled(np.asarray(part), near, ticks) for part in seen))
         return _View(seen, ticks, inner, end)
@@ -304,9 +287,10 @@ def _seen(track: LandmarkTrack, camera: PinholeCamera) -> Seen:
     )
 
 
-def _lifted(raw: Floats, size: Floats) -> LiftedTrack:
+def _lifted(raw: Floats, size: float) -> LiftedTrack:
+    """Of outputs of the network, (T, OUTPUTS), and the typical size of their stretch."""
     root, root_spread, rest = raw[:, 0], raw[:, 1], by_landmark(raw)
-    centre, unit = np.exp(root) / size, size[:, None]
+    centre = np.exp(root) / size
     return LiftedTrack(
         centre,
         centre * spread(root_spread),
@@ -314,7 +298,7 @@ def _lifted(raw: Floats, size: Floats) -> LiftedTrack:
         spread(rest[:, 1]),
         rest[:, 2],
         spread(rest[:, 3]),
-        unit[..., None] * rest[:, 4:6].swapaxes(1, 2),
-        unit * spread(rest[:, 6]),
+        size * rest[:, 4:6].swapaxes(1, 2),
+        size * spread(rest[:, 6]),
         1.0 / (1.0 + np.exp(-raw[:, STANDING])),
     )

@@ -191,7 +191,7 @@ class DrivenClip:
         body = space.load(resolution, self.puppet.shape)
         rig = Rig(body.skeleton, self.puppet.keypoints)
         pose = resample_pose(self.pose, self.clip.times_s, times_s)
-        vertices = fitted_vertices(body, rig, len(times_s), pose.at)
+        vertices = fitted_vertices(body, rig, pose)
         return MeshSequence(vertices, body.faces, Timebase(times_s), "body driven by a skeleton")
 
 

@@ -71,7 +71,7 @@ video, body, mesh, map
 1 sd2core/body/person_tracker.py PersonTracker.step: where the person is
 1 sd2core/body/refining.py Refiner.stretch: landmarks, (T, 33, 2)
 1 sd2core/body/landmark_repair.py repair_landmarks: sides, spikes, gaps put right
-1 sd2core/body/lifter.py LiftedInParts.part: depth of each landmark
+1 sd2core/body/lifter.py Lifter.lift: depth of each landmark
 1 sd2core/body/solve.py solve: angles of the joints, by Gauss–Newton
 2 sd2core/body/fitted.py FittedMotion.mesh: vertices, (T, V, 3)
 2 sd2core/io/mesh.py save_mesh: a file, which load_mesh reads

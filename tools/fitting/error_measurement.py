@@ -91,8 +91,7 @@ def _compared(
         )
     skeleton = space.skeleton(fit.shape)
     rig = KeypointSpace(space).rig(fit.shape)
-    pose = fit.poses(np.arange(len(known.times_s)))
-    transforms = skeleton.transforms(rig.body_rotations(pose.turns), pose.translation_m)
+    transforms = skeleton.transforms(rig.body_rotations(fit.pose.turns), fit.pose.translation_m)
     true = posture(known.skeleton, known.transforms)
     fitted = posture(skeleton, transforms, true.axes)
     samples = {

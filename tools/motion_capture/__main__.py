@@ -98,9 +98,7 @@ def _before_camera(motion: BodyMotion, space: ShapeSpace, keypoints: KeypointSpa
     frames = min(len(motion), _MAX_FRAMES)
     pose = Pose(from_vector(motion.vectors[:frames]), motion.translation_m[:frames])
     body = space.load("low", motion.shape)
-    posed = fitted_vertices(body, keypoints.rig(motion.shape), frames, pose.at)[:].astype(
-        np.float64
-    )
+    posed = fitted_vertices(body, keypoints.rig(motion.shape), pose)[:].astype(np.float64)
     posed[..., 0] -= posed[..., 0].mean()
     posed[..., 1] += _ABOVE_FLOOR_M
     posed[..., 2] += _NEAREST_M - posed[..., 2].min()

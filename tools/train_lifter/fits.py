@@ -14,7 +14,7 @@ from sd2core import PAPER_RADAR, MeshSequence, Sd2Error, Synthesizer, VirtualSen
 from sd2core.body.fit import Fitting, fit_motion, speed_mps
 from sd2core.body.landmark_repair import repair_landmarks
 from sd2core.body.landmarks import DEFAULT_MAX_GAP_S
-from sd2core.body.lifter import LiftedInParts, Lifter, fit_law_terms
+from sd2core.body.lifter import Lifter, fit_law_terms
 from sd2core.body.lifter_features import RATE_HZ
 from sd2core.body.parts import synthetic_map
 from sd2core.body.person_selection import FOUND
@@ -106,15 +106,15 @@ def fitted_takes(
         track = track_of(take)
         if not track.present.all():
             continue
-        lifted = LiftedInParts(lifter, track, take.camera)
-        fit = Fitting(track, take.camera, take.stature_m, lambda *_, lifted=lifted: lifted, None)
+        lifted = lifter.lift(track, take.camera)
+        fit = Fitting(track, take.camera, take.stature_m, lifted, None)
         fitted_m = np.concatenate([part.keypoints_m for part in fit.finished(silent)])
         times_s = track.timebase.times_s
         fitted_mps, true_mps = (
             line_of_sight_velocity(points_m, times_s)
             for points_m in (fitted_m, take.keypoints_m.astype(np.float64))
         )
-        lifted_mps = take.stature_m * lifted.part(0, len(track)).velocity_sigma
+        lifted_mps = take.stature_m * lifted.velocity_sigma
         fast_mps = speed_mps(fitted_m, times_s)
         fitted.append(FittedTake(fast_mps, fitted_mps, true_mps, lifted_mps))
     return fitted

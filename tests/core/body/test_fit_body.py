@@ -28,28 +28,23 @@ CAMERA = PinholeCamera()
 OUTLINE = (160, 120)
 
 
-class Known:
-    """A lifter that knows the truth, but for slow errors and noise."""
-
-    def __init__(self, keypoints_m: np.ndarray, times_s: np.ndarray, stature_m: float) -> None:
-        rng = np.random.default_rng(4)
-        depth = keypoints_m[..., 2]
-        centre = depth[:, TORSO_CORNERS].mean(axis=1)
-        velocity = np.gradient(depth, times_s, axis=0) if len(times_s) > 1 else 0.0 * depth
-        self.lifted = LiftedTrack(
-            centre_depth=(centre + 0.02) / stature_m,
-            centre_sigma=np.full(len(depth), 0.03) / stature_m,
-            depth=(depth - centre[:, None] + 0.02 * rng.standard_normal(33)) / stature_m,
-            depth_sigma=np.full(depth.shape, 0.03) / stature_m,
-            velocity=(velocity + 0.1 * rng.standard_normal(depth.shape)) / stature_m,
-            velocity_sigma=np.full(depth.shape, 0.1) / stature_m,
-            across=np.zeros((*depth.shape, 2)),
-            across_sigma=np.full(depth.shape, 0.02) / centre[:, None],
-            standing=np.zeros((len(depth), len(FEET))),
-        )
-
-    def __call__(self, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
-        return self.lifted
+def known(keypoints_m: np.ndarray, times_s: np.ndarray, stature_m: float) -> LiftedTrack:
+    """What a lifter gives that knows the truth, but for slow errors and noise."""
+    rng = np.random.default_rng(4)
+    depth = keypoints_m[..., 2]
+    centre = depth[:, TORSO_CORNERS].mean(axis=1)
+    velocity = np.gradient(depth, times_s, axis=0) if len(times_s) > 1 else 0.0 * depth
+    return LiftedTrack(
+        centre_depth=(centre + 0.02) / stature_m,
+        centre_sigma=np.full(len(depth), 0.03) / stature_m,
+        depth=(depth - centre[:, None] + 0.02 * rng.standard_normal(33)) / stature_m,
+        depth_sigma=np.full(depth.shape, 0.03) / stature_m,
+        velocity=(velocity + 0.1 * rng.standard_normal(depth.shape)) / stature_m,
+        velocity_sigma=np.full(depth.shape, 0.1) / stature_m,
+        across=np.zeros((*depth.shape, 2)),
+        across_sigma=np.full(depth.shape, 0.02) / centre[:, None],
+        standing=np.zeros((len(depth), len(FEET))),
+    )
 
 
 class Scene:
@@ -94,11 +89,11 @@ class Scene:
                 ]
             ).astype(np.uint8),
         )
-        self.lift = Known(self.keypoints_m, times_s, self.shape.stature_m)
+        self.lifted = known(self.keypoints_m, times_s, self.shape.stature_m)
 
     def fit(self, **options: object) -> BodyFit:
         return fit_body(
-            self.track, CAMERA, stature_m=self.shape.stature_m, lift=self.lift, **options
+            self.track, CAMERA, stature_m=self.shape.stature_m, lifted=self.lifted, **options
         )
 
 
@@ -151,13 +146,13 @@ def test_line_of_sight_velocity_of_the_swiping_hand(scene: Scene, fitted: BodyFi
 @pytest.mark.slow
 def test_feet_that_stand_do_not_slide() -> None:
     scene = Scene(30, distance_m=4.5)
-    lifted, times_s = scene.lift.lifted, scene.track.timebase.times_s
+    lifted, times_s = scene.lifted, scene.track.timebase.times_s
     track, feet = copy.deepcopy(scene.track), list(FEET)
     track.image_px[:, feet] += 6.0 * np.sin(6.0 * times_s)[:, None, None].astype(np.float32)
     found_mps = []
     for sure in (0.0, 1.0):
         told = replace(lifted, standing=np.full_like(lifted.standing, sure))
-        fit = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lift=lambda *_, to=told: to)
+        fit = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lifted=told)
         found_mps.append(
             np.sqrt(np.mean(np.gradient(fit.keypoints_m[:, feet], times_s, axis=0) ** 2))
         )
@@ -199,7 +194,7 @@ def test_outlines_tell_a_heavy_person_from_a_light_one() -> None:
         ]
         scene.track.silhouettes[:] = masks
         scene.track.image_px[:] = CAMERA.project(keypoints_m)
-        scene.lift = Known(keypoints_m, scene.track.timebase.times_s, shape.stature_m)
+        scene.lifted = known(keypoints_m, scene.track.timebase.times_s, shape.stature_m)
         found = mesh_of(scene.fit(), "low").frame(0)
         girths[weight] = silhouette(found, body.faces, CAMERA, OUTLINE).sum()
         true = silhouette(vertices[0], body.faces, CAMERA, OUTLINE)
@@ -214,7 +209,7 @@ def test_empty_frames_hold_the_last_known_pose_and_are_marked(scene: Scene) -> N
     track.present[gap] = False
     track.image_px[gap] = np.nan
     track.visibility[gap] = 0.0
-    found = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lift=scene.lift)
+    found = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lifted=scene.lifted)
     assert not found.present[gap].any()
     assert found.present.sum() == 40
     assert np.isfinite(found.turns).all()
@@ -285,13 +280,13 @@ def test_a_stopped_fit_goes_on(
 
 @pytest.mark.slow
 def test_stature_sets_the_scale(scene: Scene, fitted: BodyFit) -> None:
-    half = fit_body(scene.track, CAMERA, stature_m=0.5 * scene.shape.stature_m, lift=scene.lift)
+    half = fit_body(scene.track, CAMERA, stature_m=0.5 * scene.shape.stature_m, lifted=scene.lifted)
     np.testing.assert_allclose(half.keypoints_m, 0.5 * fitted.keypoints_m, atol=0.03)
 
 
 def test_impossible_stature_and_nobody_are_refused(scene: Scene) -> None:
     with pytest.raises(Sd2Error, match="body height is 172"):
-        fit_body(scene.track, CAMERA, stature_m=172.0, lift=scene.lift)
+        fit_body(scene.track, CAMERA, stature_m=172.0, lifted=scene.lifted)
     empty = Scene(3)
     empty.track.present[:] = False
     with pytest.raises(Sd2Error, match="No frame of the video shows a person"):

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifter import OUTPUTS, LiftedInParts, LiftedTrack, Lifter
+from sd2core.body.lifter import OUTPUTS, Lifter
 from sd2core.body.lifter_features import Seen, features
 from sd2core.body.network import Network
 from sd2core.body.rig import KeypointSpace
@@ -63,10 +63,6 @@ def _moving(
     motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
     places = KeypointSpace(space).of(shape).positions(skeleton.transforms(*motion))
     return places + np.array([0.0, 1.1, DISTANCE_M]), shape.stature_m
-
-
-def lifted_by(lifter: Lifter, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
-    return LiftedInParts(lifter, track, camera).part(0, len(track))
 
 
 def _track(places_m: np.ndarray, rate_hz: float = 30.0) -> LandmarkTrack:
@@ -125,8 +121,8 @@ def test_a_still_person_is_still(lifter: Lifter) -> None:
     noisy = _track(places)
     rng = np.random.default_rng(0)
     jitter = 0.15 * rng.standard_normal(noisy.image_px.shape)
-    lifted = lifted_by(
-        lifter, replace(noisy, image_px=noisy.image_px + jitter.astype(np.float32)), CAMERA
+    lifted = lifter.lift(
+        replace(noisy, image_px=noisy.image_px + jitter.astype(np.float32)), CAMERA
     )
     assert np.sqrt(np.mean((stature_m * lifted.velocity) ** 2)) < 0.06
 
@@ -136,7 +132,7 @@ def test_unseen_motion_is_followed_along_the_line_of_sight(lifter: Lifter) -> No
     elbow = LANDMARKS.index("elbow.R")
     for seed in range(20, 26):
         places, stature_m = _moving(seed, 2.0, still=False, style="quick", natural=True)
-        lifted = lifted_by(lifter, _track(places), CAMERA)
+        lifted = lifter.lift(_track(places), CAMERA)
         wanted.append(np.gradient(places[:, elbow, 2], 1.0 / 30.0))
         found.append(stature_m * lifted.velocity[:, elbow])
         sigma_mps = stature_m * lifted.velocity_sigma[:, elbow]
@@ -152,13 +148,13 @@ def test_unseen_motion_is_followed_along_the_line_of_sight(lifter: Lifter) -> No
 def test_sides_and_directions_of_time_are_treated_alike(lifter: Lifter) -> None:
     places, _ = _moving(3, 1.5, still=False)
     track = _track(places)
-    plain = lifted_by(lifter, track, CAMERA)
+    plain = lifter.lift(track, CAMERA)
     sides = list(MIRRORED)
-    mirror = lifted_by(lifter, _track(places[:, sides] * [-1.0, 1.0, 1.0]), CAMERA)
+    mirror = lifter.lift(_track(places[:, sides] * [-1.0, 1.0, 1.0]), CAMERA)
     np.testing.assert_allclose(mirror.velocity[:, sides], plain.velocity, atol=2e-3)
     np.testing.assert_allclose(mirror.centre_depth, plain.centre_depth, rtol=1e-3)
     np.testing.assert_allclose(mirror.across[:, sides], plain.across * [-1.0, 1.0], atol=1e-4)
-    backwards = lifted_by(lifter, _track(places[::-1]), CAMERA)
+    backwards = lifter.lift(_track(places[::-1]), CAMERA)
     np.testing.assert_allclose(-backwards.velocity[::-1], plain.velocity, atol=2e-3)
     np.testing.assert_allclose(backwards.depth_sigma[::-1], plain.depth_sigma, rtol=1e-2)
 
@@ -170,17 +166,17 @@ def test_empty_frames_stay_empty_and_part_the_clip(lifter: Lifter) -> None:
     present[25:31] = False
     image = track.image_px.copy()
     image[25:31] = np.nan
-    lifted = lifted_by(lifter, replace(track, present=present, image_px=image), CAMERA)
+    lifted = lifter.lift(replace(track, present=present, image_px=image), CAMERA)
     assert np.isnan(lifted.velocity[25:31]).all()
     assert np.isfinite(lifted.velocity[present]).all()
 
 
 def test_the_frame_rate_does_not_matter(lifter: Lifter) -> None:
     places, _ = _moving(7, 2.0, still=False)
-    plain = lifted_by(lifter, _track(places), CAMERA)
+    plain = lifter.lift(_track(places), CAMERA)
     often = np.repeat(places, 2, axis=0)[:-1].copy()
     often[1::2] = 0.5 * (places[1:] + places[:-1])
-    twice = lifted_by(lifter, _track(often, 60.0), CAMERA)
+    twice = lifter.lift(_track(often, 60.0), CAMERA)
     inner = slice(5, -5)
     difference = twice.velocity[::2][inner] - plain.velocity[inner]
     assert np.sqrt(np.mean(difference**2)) < 0.25 * plain.velocity[inner].std()
@@ -209,8 +205,7 @@ def test_a_limb_that_is_not_seen_is_known_less_well(lifter: Lifter) -> None:
     hidden = track.visibility.copy()
     hidden[:, wrist] = 0.02
     seen, unseen = (
-        lifted_by(lifter, replace(track, visibility=one), CAMERA)
-        for one in (track.visibility, hidden)
+        lifter.lift(replace(track, visibility=one), CAMERA) for one in (track.visibility, hidden)
     )
     for name in ("velocity_sigma", "across_sigma"):
         known, guessed = (np.median(getattr(one, name)[:, wrist]) for one in (seen, unseen))
@@ -225,14 +220,14 @@ def test_who_moves_fast_is_known_less_well(lifter: Lifter) -> None:
 def test_clips_of_few_frames(lifter: Lifter, frames: int) -> None:
     places, _ = _moving(8, 0.5, still=False)
     for rate_hz in (10.0, 30.0):
-        lifted = lifted_by(lifter, _track(places[:frames], rate_hz), CAMERA)
+        lifted = lifter.lift(_track(places[:frames], rate_hz), CAMERA)
         assert np.isfinite(lifted.depth).all()
 
 
 def test_the_picture_must_be_the_camera_s(lifter: Lifter) -> None:
     places, _ = _moving(9, 0.2, still=True)
     with pytest.raises(Sd2Error, match="640"):
-        lifted_by(lifter, _track(places), PinholeCamera(320, 240, 300.0))
+        lifter.lift(_track(places), PinholeCamera(320, 240, 300.0))
 
 
 def test_a_damaged_later_or_older_file_is_refused(tmp_path: Path) -> None:
