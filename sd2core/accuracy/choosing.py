@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS, MASK_REUSE_M, AccuracyPlan, counting_plans
 from sd2core.accuracy.reasons import reasons_for
@@ -12,12 +14,14 @@ from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
 _MAX_TRIALS = 8
 _MORE_TRIALS = 4
+
+_BETTER = 0.7
+"""Of a failed plan's forecast error, what that of the next one that is tried is at most."""
 
 _SLACK = 1.5
 """Errors of single settings add up to more than a plan's error; by this factor at most."""
@@ -45,8 +49,8 @@ def choose(
     Parameters
     ----------
     tolerance : float
-        Relative L1 of the map after smoothing against the reference plan in double
-        precision, on frames that were not used to choose.
+        Relative L1 of the whole clip's map after smoothing against the reference plan in
+        double precision, as some frames tell of it.
     budget_ms : float
         Milliseconds per frame on all cores, after a move of the sensor.
     dragging : bool
@@ -82,8 +86,7 @@ def choose(
         assert budget_ms is not None
         plan = _most_accurate(survey, budget_ms, dragging, progress)
         holds = survey.forecast_ms(plan) <= budget_ms
-        runs = survey.trial.sample.checked_on
-        tried[plan] = survey.trial.errors(plan, runs, progress=progress)
+        tried[plan] = survey.trial.errors(plan, progress=progress)
     return Choice(
         plan=plan,
         holds=holds,
@@ -93,7 +96,6 @@ def choose(
         tolerance=tolerance,
         budget_ms=budget_ms,
         spent_s=time.perf_counter() - started,
-        unseen=set(survey.trial.sample.chosen_on).isdisjoint(survey.trial.sample.checked_on),
     )
 
 
@@ -132,31 +134,38 @@ def _cheapest(
 ) -> AccuracyPlan:
     """Cheapest plan that holds, else the one of smallest error.
 
-    ``tried`` gets all errors: on the frames to choose on where they are too large already, else on
-    those to check on.
+    ``tried`` gets the errors of those that are not too far off on the frames to choose on already.
     """
-    sample = survey.trial.sample
+    trial, sample = survey.trial, survey.trial.sample
+    reference = trial.reference(sample.chosen_on, progress=progress)
 
     def holds(plan: AccuracyPlan) -> bool:
-        for runs in (sample.chosen_on, sample.checked_on):
-            tried[plan] = survey.trial.errors(plan, runs, progress=progress)
-            if tried[plan].l1 > tolerance:
-                return False
-        return True
+        if trial.columns(plan, sample.chosen_on, progress=progress).off(reference) > tolerance:
+            return False
+        tried[plan] = trial.errors(plan, progress=progress)
+        return tried[plan].l1 <= tolerance
 
     most_accurate = replace(survey.base, frame_rate_factor=max(FRAME_RATE_FACTORS))
-    if not survey.trial.tells and holds(most_accurate):
+    if not trial.tells and holds(most_accurate):
         return most_accurate
     plans = sorted(_candidates(survey), key=survey.cost_key)
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
-    safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
-    safe.append(min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan))))
-    safe_plan = next(filter(holds, (*safe[: _MAX_TRIALS - 1], safe[-1])), None)
+    safest = min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan)))
+
+    def promising() -> Iterator[AccuracyPlan]:
+        """Plans that should hold, cheapest first: if one fails, those hardly better would, too."""
+        limit = tolerance
+        for plan in plans:
+            if forecast[plan] <= limit:
+                yield plan
+                limit = _BETTER * forecast[plan]
+
+    to_try = (*islice(promising(), _MAX_TRIALS - 1), safest)
+    safe_plan = next(filter(holds, to_try), None)
     if safe_plan is None:
-        best = min(tried, key=lambda plan: tried[plan].l1)
-        tried[best] = survey.trial.errors(best, sample.checked_on, progress=progress)
-        return best
+        tried.setdefault(safest, trial.errors(safest, progress=progress))
+        return min(tried, key=lambda plan: tried[plan].l1)
     # Changes do not quite add up: some of the cheaper plans may hold as well.
     cheaper = plans[: plans.index(safe_plan)]
     near = [plan for plan in cheaper if tolerance < forecast[plan] <= _SLACK * tolerance]
@@ -197,7 +206,7 @@ def _reach_m(survey: Survey, progress: Progress) -> float | None:
         if plan not in survey.change:
             against = against or trial.columns(base, runs, progress=progress).twice()
             columns = trial.columns(plan, runs, progress=progress)
-            survey.change[plan] = relative_l1(columns.smooth, against.smooth)
+            survey.change[plan] = columns.off(against)
         if survey.change[plan] < survey.change[replace(base, visibility="facing")]:
             return reach_m
     return None

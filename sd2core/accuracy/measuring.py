@@ -116,7 +116,7 @@ class _Counts:
     def __init__(
         self, mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions
     ) -> None:
-        self._trial = Trial(mesh, sensor, options, take_sample(mesh, options))
+        self._trial = Trial(mesh, sensor, options, take_sample(mesh, sensor, options))
         self._runs = self._trial.sample.runs
         self._surface = mesh.faces is not None
         self.frames = tuple(sorted(frame for run in self._runs for frame in run.frames))
@@ -143,7 +143,7 @@ class _Counts:
 
     def errors(self, plan: AccuracyPlan) -> Errors:
         """Errors against the reference."""
-        return self._trial.errors(plan, self._runs)
+        return self._trial.errors(plan)
 
     def begun(self, plan: AccuracyPlan, memory: bool) -> tuple[int | None, float]:
         """Most bytes allocated at once from scratch, and seconds before the first frame."""
@@ -182,7 +182,7 @@ class _Waves:
             )
         self._mesh, self._sensor, self._axis = mesh, sensor, options.axis
         self._smoothing = velocity_kernel(options.axis.bins, options.velocity_sigma_bins)
-        runs = take_sample(mesh, options).runs
+        runs = take_sample(mesh, sensor, options, _FRAMES).runs
         per_run = -(-_FRAMES // len(runs))
         middles = {
             run.frames[(2 * number + 1) * len(run.frames) // (2 * per_run)]

@@ -26,7 +26,7 @@ from sd2core.sensor import VirtualSensor
 MAX_PLACES = 3
 """On which a plan is checked: each takes some hundred milliseconds."""
 
-_CHOOSING_FRAMES, _CHECKING_FRAMES = 250, 30
+_CHOOSING_FRAMES, _CHECKING_FRAMES = 250, 80
 """Frames of the reference that choosing takes about as long as (how well that fits prints
 tests/benchmarks/test_tolerance_speed.py), and that are checked on."""
 
@@ -150,7 +150,7 @@ class PlanSearch:
         """Plan with its largest error, or None if it does not hold everywhere."""
         worst = 0.0
         for trial in self._tried():
-            worst = max(worst, trial.errors(plan, trial.sample.checked_on).l1)
+            worst = max(worst, trial.errors(plan).l1)
             if worst > self._tolerance or not trial.tells:
                 return None
         return PlacedPlan(plan, worst, reasons)
@@ -207,7 +207,7 @@ class PlanSearch:
 
     def _tried(self) -> list[Trial]:
         if not self._trials:
-            sample = take_sample(self._mesh, self._options)
+            sample = take_sample(self._mesh, self._places[0], self._options)
             first = Trial(self._mesh, self._places[0], self._options, sample)
             self._trials = [first, *(first.at(place) for place in self._places[1:])]
         return self._trials

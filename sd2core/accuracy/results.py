@@ -37,9 +37,10 @@ class Errors:
     """Errors of a plan's map against the reference map of the same frames."""
 
     l1: float
-    """Relative L1 of all frames together, after smoothing: sum of absolute differences over the
-    sum of the reference. A tolerance limits this error."""
-    l1_raw: float  # the same before smoothing, which hides errors
+    """Relative L1 of the whole map, after smoothing: sum of absolute differences over the sum of
+    the reference. Where some frames tell of a clip, with the standard error of that. A tolerance
+    limits this error."""
+    l1_raw: float  # the same before smoothing, which hides errors, without a standard error
     l1_frames: Spread  # of single frames
     l1_raw_frames: Spread
     peak_mps: Spread  # absolute error of the strongest bin's velocity
@@ -145,7 +146,7 @@ class Choice:
 
     plan: AccuracyPlan
     holds: bool  # True if tolerance or budget is held; otherwise the plan is the best available
-    errors: Errors  # on the frames to check on
+    errors: Errors
     cost_ms: float
     """Milliseconds per frame when all cores share the work: a forecast from the processor time of
     its parts, measured while choosing."""
@@ -153,9 +154,6 @@ class Choice:
     tolerance: float | None  # requested relative L1 after smoothing
     budget_ms: float | None  # requested milliseconds per frame
     spent_s: float  # duration of the choice
-    unseen: bool = True
-    """True if the errors are of frames that were not used to choose; a clip of fewer than ten
-    frames has none to spare."""
 
     @property
     def summary(self) -> str:
@@ -188,6 +186,7 @@ def compute_errors(
     smooth: NDArray[np.float64],
     reference_smooth: NDArray[np.float64],
     axis: VelocityAxis,
+    weight: NDArray[np.float64] | float = 1.0,
 ) -> Errors:
     """Compare a map with its reference, before and after smoothing.
 
@@ -202,6 +201,8 @@ def compute_errors(
         The same frames after smoothing.
     axis : VelocityAxis
         Of both.
+    weight : ndarray, (n,), or float
+        Of each frame in the L1 of all together.
     """
     energy = reference_smooth.sum(axis=0)
     moving = (energy > 0) & (energy >= _MOVING * energy.mean())
@@ -212,8 +213,8 @@ def compute_errors(
     peak_mps = np.abs(_peaks(a, centres_mps) - _peaks(b, centres_mps))
     wrong = np.where(a.sum(axis=0) > 0, 0.5 * np.abs(share_a - share_b).sum(axis=0), 1.0)
     return Errors(
-        l1=relative_l1(smooth, reference_smooth),
-        l1_raw=relative_l1(raw, reference_raw),
+        l1=relative_l1(smooth * weight, reference_smooth * weight),
+        l1_raw=relative_l1(raw * weight, reference_raw * weight),
         l1_frames=_per_frame(smooth, reference_smooth, moving),
         l1_raw_frames=_per_frame(raw, reference_raw, moving),
         peak_mps=Spread.of(peak_mps),

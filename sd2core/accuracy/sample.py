@@ -11,37 +11,41 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.plans import MASK_STRIDES
 from sd2core.doppler.options import SynthesisOptions
+from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 KEPT = 10
 """Frames of a run that are compared; more are read around them."""
 
-_CANDIDATES, _MOST_CANDIDATES = 24, 240
+_RUNS = 8
+_CHOOSING_RUNS = 2
+_CANDIDATES, _MOST_CANDIDATES = 48, 240
 _EVERY_FRAMES = 75
 """Of a long clip one candidate: some recordings are gestures with long pauses between them."""
 
-_LIVELY_SHARE = 0.01
-"""Of the liveliest candidate's squared speed: what moves less hardly counts in the map."""
+_QUIET_SHARE = 0.1
+"""Of the mean candidate's part in the map, what each is taken to have at least: what the facing
+test says of a few frames is not all."""
 
 _MIN_MARGIN = 5
 _SMOOTHING_REACH = 5.0
-_PROBED_VERTICES = 500
 _SHORTEST_RUN = 5
-_MIN_STARTS = 2
-"""One to choose on and one to check on."""
 
 
 @dataclass(frozen=True)
 class Run:
     """Consecutive frames ``start`` to ``stop`` (exclusive) of the sampled mesh.
 
-    ``first`` is the number of the first of them in the clip.
+    ``first`` is the number of the first of them in the clip; ``weight`` is in proportion to how
+    many frames of the clip each of them stands for.
     """
 
     start: int
     stop: int
     first: int
+    weight: float = 1.0
 
     @property
     def frames(self) -> range:
@@ -51,19 +55,13 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Runs of frames, from the liveliest to the quieter ones of a clip."""
+    """Runs of frames, from those with the most to those with the least in a map."""
 
     frames: NDArray[np.intp]
     """Frames of the clip that are read: every run with the frames around it, which its velocities,
     smoothing and reused masks look at."""
-    chosen_on: tuple[Run, ...]  # runs to choose a plan on
-    checked_on: tuple[Run, ...]
-    """Runs to check it on; the same run in a clip of fewer than ten frames."""
-
-    @property
-    def runs(self) -> tuple[Run, ...]:
-        """Runs to choose on and to check on, each once."""
-        return tuple(dict.fromkeys((*self.chosen_on, *self.checked_on)))
+    runs: tuple[Run, ...]  # that stand for the clip together
+    chosen_on: tuple[Run, ...]  # some of them, on which settings are tried one by one
 
     def of(self, mesh: MeshSequence) -> MeshSequence:
         """Sampled frames of a mesh in memory, one run after the other at their own times.
@@ -88,11 +86,26 @@ class Sample:
         )
 
 
-def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) -> Sample:
-    """Choose frames on which plans are compared: ``runs`` of ten frames, half of them to choose on.
+def take_sample(
+    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, runs: int = _RUNS
+) -> Sample:
+    """Choose frames on which plans are compared: some ``runs`` of ten frames.
 
-    Every second run in order of liveliness is to check on. A clip that is too short for
-    them is used whole. Smoothing of the vertices' paths widens the margins of the runs.
+    How often a run is drawn is in proportion to what the sensor receives in it, at a glance, and
+    its weight to the reverse: together they tell of the whole map, whatever moves where it is not
+    received. A clip that is too short for them is used whole. Smoothing of the vertices' paths
+    widens the margins of the runs.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        The clip.
+    sensor : VirtualSensor
+        Whose map the plans make.
+    options : SynthesisOptions
+        For what a plan does not choose.
+    runs : int
+        At most.
     """
     frames = mesh.frame_count
     margin = _MIN_MARGIN
@@ -105,60 +118,66 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     length = -(-(KEPT + 2 * margin) // every) * every
     if frames < 2 * length:
         return _whole(frames)
-    candidates = min(max(_CANDIDATES, frames // _EVERY_FRAMES), _MOST_CANDIDATES)
-    starts = np.unique(np.linspace(0, frames - length, candidates).astype(int) // every * every)
-    present = np.logical_or.reduce([body.presence.present for body in mesh.bodies])
-    with_person = [bool(present[start : start + length].all()) for start in starts.tolist()]
-    peopled = _apart(starts[with_person], length)
-    starts = peopled if len(peopled) >= _MIN_STARTS else _apart(starts, length)
-    middles = (starts + length // 2).tolist()
-    speed = np.array([sum(_speed(body, middle) for body in mesh.bodies) for middle in middles])
-    order = starts[np.argsort(-speed, kind="stable")]
-    # From the liveliest down to those of middling liveliness, where so many move at all.
-    moving = int((speed >= _LIVELY_SHARE * speed.max()).sum())
-    pool = order[: max(min(len(order) * 2 // 3, moving), runs)]
-    lively = pool[np.unique(np.linspace(0, len(pool) - 1, runs).astype(int))]
-    ascending = np.sort(lively)
+    count = min(max(_CANDIDATES, frames // _EVERY_FRAMES), _MOST_CANDIDATES)
+    starts = np.unique(np.linspace(0, frames - length, count).astype(int) // every * every)
     before = (length - KEPT) // 2
-    placed = {
-        int(start): Run(
-            position * length + before, position * length + before + KEPT, int(start) + before
-        )
-        for position, start in enumerate(ascending)
-    }
-    return Sample(
-        np.concatenate([np.arange(start, start + length) for start in ascending]),
-        tuple(placed[int(start)] for start in lively[::2]),
-        tuple(placed[int(start)] for start in lively[1::2]),
+    # With the clip's first frames, and its last: at its ends paths may be of another kind.
+    firsts = np.where(starts == 0, 0, starts + before)
+    stops = np.where(starts + length > frames - every, frames, starts + before + KEPT)
+    present = np.logical_or.reduce([body.presence.present for body in mesh.bodies])
+    peopled = [present[a:b].any() for a, b in zip(firsts.tolist(), stops.tolist(), strict=True)]
+    numbers = np.flatnonzero(peopled) if any(peopled) else np.arange(len(starts))
+    weights = np.ones(len(numbers))
+    if len(numbers) > runs:
+        drawn, weights = _drawn(_received(mesh, sensor, options, firsts[numbers]), runs)
+        numbers = numbers[drawn]
+    spans = [(starts[n], firsts[n], stops[n]) for n in numbers]
+    read = np.unique(
+        np.concatenate([np.arange(start, max(start + length, stop)) for start, _, stop in spans])
     )
+    kept = []
+    for (_, first, stop), weight in zip(spans, weights.tolist(), strict=True):
+        position = int(np.searchsorted(read, first))
+        kept.append(Run(position, position + int(stop - first), int(first), weight))
+    apart = max(len(kept) // _CHOOSING_RUNS, 1)
+    return Sample(read, tuple(kept), tuple(kept[apart // 2 :: apart][:_CHOOSING_RUNS]))
+
+
+def _drawn(
+    received: NDArray[np.float64], runs: int
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Numbers of the runs that are drawn in proportion to what is received, and their weights."""
+    expected = received + (_QUIET_SHARE * received.mean() or 1.0)
+    order = np.argsort(-expected, kind="stable")
+    up_to = np.cumsum(expected[order])
+    places = np.searchsorted(up_to, up_to[-1] * (np.arange(runs) + 0.5) / runs)
+    ranks, times = np.unique(places, return_counts=True)
+    return order[ranks], times / expected[order[ranks]]
+
+
+def _received(
+    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, firsts: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """What the map has in two frames of each run, when only the facing test is made."""
+    quick = replace(
+        options,
+        visibility="none" if mesh.faces is None else "facing",
+        trajectory_smoothing_s=0.0,
+        velocity_sigma_bins=0.0,
+        time_sigma_s=0.0,
+        beyond="wrap",
+    )
+    maps = Synthesizer(mesh, quick, block_frames=1)
+
+    def at(frame: int) -> float:
+        return float(maps.stretch(sensor, frame, frame + 1, shares=False).raw.sum())
+
+    return np.array([at(first + KEPT // 4) + at(first + 3 * KEPT // 4) for first in firsts])
 
 
 def _whole(frames: int) -> Sample:
-    """Sample of a whole short clip, cut into runs that take turns."""
+    """Sample of a whole short clip, cut into runs; settings are tried on every other one."""
     count = max(1, min(8, frames // _SHORTEST_RUN))
     edges = np.linspace(0, frames, count + 1).astype(int).tolist()
-    runs = [Run(a, b, a) for a, b in itertools.pairwise(edges)]
-    return Sample(
-        np.arange(frames), tuple(runs[::2]), tuple(runs[1::2]) if count > 1 else tuple(runs)
-    )
-
-
-def _apart(starts: NDArray[np.intp], length: int) -> NDArray[np.intp]:
-    """Starts of the runs that do not overlap with the one before."""
-    kept: list[int] = []
-    for start in starts.tolist():
-        if not kept or start >= kept[-1] + length:
-            kept.append(start)
-    return np.array(kept, dtype=np.intp)
-
-
-def _speed(mesh: MeshSequence, frame: int) -> float:
-    """Mean squared speed of some vertices, in (m/s)²; 0 without a person."""
-    if not mesh.presence.present[frame : frame + 2].all():
-        return 0.0
-    two = mesh.read(frame, frame + 2).astype(np.float64)
-    refuse_missing(two, frame, mesh.source)
-    probed = two[:, :: max(1, mesh.vertex_count // _PROBED_VERTICES)]
-    step = probed[1] - probed[0]
-    duration_s = mesh.times_s[frame + 1] - mesh.times_s[frame]
-    return float((step**2).sum(axis=1).mean() / duration_s**2)
+    runs = tuple(Run(a, b, a) for a, b in itertools.pairwise(edges))
+    return Sample(np.arange(frames), runs, runs[::2])

@@ -16,7 +16,6 @@ from sd2core.accuracy.trial import Trial
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
-from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
@@ -134,7 +133,7 @@ def survey_scene(
     """
     surface = mesh.faces is not None
     if trial is None:
-        trial = Trial(mesh, sensor, options, take_sample(mesh, options))
+        trial = Trial(mesh, sensor, options, take_sample(mesh, sensor, options))
     base = AccuracyPlan(visibility="exact" if surface else "none", weight=options.weight)
     single = [replace(sight, weight=options.weight) for sight in visibility_plans(surface=surface)]
     single += [replace(base, vertices_kept=kept) for kept in trial.vertices_kept if kept < 1]
@@ -164,7 +163,7 @@ def survey_scene(
     at_rate = {}
     for plan in rates:
         at_rate[plan] = trial.columns(plan, runs, progress=within)
-        survey.change[plan] = relative_l1(at_rate[plan].smooth, reference.smooth)
+        survey.change[plan] = at_rate[plan].off(reference)
         step()
     # In turns, so that a busy machine slows all alike; the first time prepares what only this
     # plan needs.
@@ -184,7 +183,7 @@ def survey_scene(
     survey.mask_ms[base] = max(base_ms - quick_ms, 0.0)
     for plan in single:
         columns = trial.columns(plan, runs, progress=within)
-        survey.change[plan] = relative_l1(columns.smooth, against.smooth)
+        survey.change[plan] = columns.off(against)
         spent_ms = columns.milliseconds
         if plan.vertices_kept < 1 or spent_ms > base_ms:
             # The first time loads and prepares what only this plan needs.
@@ -198,7 +197,7 @@ def survey_scene(
     if mesh.others:
         alone = Trial(replace(mesh, others=()), sensor, options, trial.sample)
         columns = alone.columns(base, runs, progress=within)
-        survey.others_change = relative_l1(columns.smooth, against.smooth)
+        survey.others_change = columns.off(against)
         step()
     return survey
 

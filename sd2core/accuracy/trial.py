@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan, visibility_plans
 from sd2core.accuracy.results import Errors, compute_errors
-from sd2core.accuracy.sample import Run, Sample
+from sd2core.accuracy.sample import KEPT, Run, Sample, take_sample
 from sd2core.doppler.masks import Visibility
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.reference import reference_stretch
@@ -23,6 +22,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.made_vertices import shifted_like, unshifted
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.numerics.parallel import spread
 from sd2core.options.synthesis import ScenePart
 from sd2core.progress import Progress, silent
@@ -71,8 +71,8 @@ def synthesizer_for(
 _BLOCK_FRAMES = 5
 """Half a run, so that of a run's margins nothing is prepared."""
 
-_REFERENCE_FRAMES = 5
-"""At once: some 50 ms of a large mesh, so that a cancelled choice soon ends."""
+_REFERENCE_VERTICES = 50_000
+"""In frames at once: some 50 ms, so that a cancelled choice soon ends; more do not fit a cache."""
 
 _ASIDE_M = 1e-12
 """Offset that changes no map, but makes another place, whose masks are computed again; far out it
@@ -88,7 +88,12 @@ class Columns:
 
     raw: NDArray[np.float64]
     smooth: NDArray[np.float64]
+    weight: NDArray[np.float64]  # of each in the map of the clip, see Run
     milliseconds: float = 0.0
+
+    def off(self, reference: Columns) -> float:
+        """Relative L1 of the clip's smoothed map, estimated from these columns."""
+        return relative_l1(self.smooth * self.weight, reference.smooth * self.weight)
 
     def twice(self) -> Columns:
         """Columns, followed by the same columns again."""
@@ -111,7 +116,8 @@ class Trial:
         self.options = options
         # Smoothed here, within the runs: smoothing over time looks at other frames.
         self._unsmoothed = replace(options, velocity_sigma_bins=0.0, time_sigma_s=0.0)
-        self._meshes: dict[float, MeshSequence] = {}
+        self._decimated: dict[float, MeshSequence] = {}
+        self._meshes: dict[float, MeshSequence] = {}  # sampled
         self._decimating_s: dict[float, float] = {}
         self._prepared: dict[tuple[float, int, int | None], Synthesizer] = {}
         self._references: dict[Run, Columns] = {}
@@ -141,23 +147,22 @@ class Trial:
 
     @property
     def tells(self) -> bool:
-        """False if some of the runs are empty, which tells nothing of the rest of the clip."""
+        """False if the runs to choose on are empty, which tells nothing of the rest of the clip."""
         sample = self.sample
-        return len(sample.frames) == self.mesh.frame_count or all(
-            self.reference(runs).raw.any() for runs in (sample.chosen_on, sample.checked_on)
-        )
+        whole = len(sample.frames) == self.mesh.frame_count
+        return whole or bool(self.reference(sample.chosen_on).raw.any())
 
     def at(self, sensor: VirtualSensor) -> Trial:
-        """Trial from another place, sharing what does not depend on it."""
-        other = copy.copy(self)
-        other.sensor = sensor
-        other._references = {}
+        """Trial from another place, where other frames count, sharing decimated meshes."""
+        other = Trial(self.mesh, sensor, self.options, take_sample(self.mesh, sensor, self.options))
+        other._decimated, other._decimating_s = self._decimated, self._decimating_s
         return other
 
     def reference(self, runs: Sequence[Run], *, progress: Progress = silent) -> Columns:
         """Columns of the reference plan, in double precision."""
         options = reference_plan("histogram", self.options.weight).options(self._unsmoothed)
         mesh = self._sampled(1.0)
+        at_once = min(max(_REFERENCE_VERTICES // mesh.vertex_count, 1), KEPT)
 
         def work(start: int, stop: int) -> NDArray[np.float64]:
             return reference_stretch(mesh, self.sensor, options, start, stop)
@@ -165,14 +170,14 @@ class Trial:
         for run in runs:
             if run in self._references:
                 continue
-            starts = range(run.start, run.stop, _REFERENCE_FRAMES)
-            stops = (min(start + _REFERENCE_FRAMES, run.stop) for start in starts)
+            starts = range(run.start, run.stop, at_once)
+            stops = (min(start + at_once, run.stop) for start in starts)
             columns = []
             for number, column in enumerate(spread(work, starts, stops)):
                 columns.append(column)
                 progress(number + 1, len(starts))
             raw = np.concatenate(columns, axis=1)
-            self._references[run] = Columns(raw, self._smoothed(raw, run))
+            self._references[run] = self._columns(raw, run)
         return _joined([self._references[run] for run in runs])
 
     def columns(
@@ -196,16 +201,18 @@ class Trial:
             )
         return _joined(parts)
 
-    def errors(
-        self, plan: AccuracyPlan, runs: Sequence[Run], *, progress: Progress = silent
-    ) -> Errors:
-        """Errors of a plan against the reference on some runs."""
-        reference = self.reference(runs, progress=progress)
-        columns = self.columns(plan, runs, progress=progress)
+    def errors(self, plan: AccuracyPlan, *, progress: Progress = silent) -> Errors:
+        """Errors of a plan's map of the whole clip, as the sampled runs tell of it.
+
+        With its standard error, by which they may tell too little, added to the L1.
+        """
+        reference = self.reference(self.sample.runs, progress=progress)
+        columns = self.columns(plan, self.sample.runs, progress=progress)
         if plan.mask_reuse_m:
             reference = reference.twice()
-        axis = self.options.axis
-        return compute_errors(columns.raw, reference.raw, columns.smooth, reference.smooth, axis)
+        maps = columns.raw, reference.raw, columns.smooth, reference.smooth
+        found = compute_errors(*maps, self.options.axis, columns.weight)
+        return replace(found, l1=found.l1 + self._standard_error(columns, reference))
 
     def milliseconds(
         self,
@@ -300,12 +307,27 @@ class Trial:
         """Drop prepared frames, so that their preparation can be measured."""
         self._prepared.clear()
 
+    def _standard_error(self, columns: Columns, reference: Columns) -> float:
+        """Standard error of the relative L1 of the clip: of a ratio of sums over runs."""
+        lengths = [run.stop - run.start for run in self.sample.runs]
+        energy = reference.smooth.sum(axis=0) * columns.weight
+        if len(lengths) < 2 or not energy.any():
+            return 0.0
+        difference = np.abs(columns.smooth - reference.smooth).sum(axis=0) * columns.weight
+        rest = (difference - energy * (difference.sum() / energy.sum())) / energy.sum()
+        # Both sides of a kept mask are of the same frames.
+        of_frames = rest.reshape(-1, sum(lengths)).sum(axis=0)
+        of_runs = np.add.reduceat(of_frames, np.cumsum([0, *lengths[:-1]]))
+        unread = 1 - sum(lengths) / self.mesh.frame_count
+        return math.sqrt(unread * len(lengths) / (len(lengths) - 1) * float((of_runs**2).sum()))
+
     def _sampled(self, kept: float) -> MeshSequence:
-        if kept not in self._meshes:
+        if kept not in self._decimated:
             start = time.perf_counter()
-            coarser = decimate(self.mesh, kept)
+            self._decimated[kept] = decimate(self.mesh, kept)
             self._decimating_s[kept] = time.perf_counter() - start
-            self._meshes[kept] = self.sample.of(coarser)
+        if kept not in self._meshes:
+            self._meshes[kept] = self.sample.of(self._decimated[kept])
         return self._meshes[kept]
 
     def _counted(
@@ -324,15 +346,16 @@ class Trial:
             for run in runs
         ]
         made = zip((stretch.raw for stretch in stretches), runs, strict=True)
-        joined = _joined([Columns(raw, self._smoothed(raw, run)) for raw, run in made])
+        joined = _joined([self._columns(raw, run) for raw, run in made])
         spent_ms = 1e3 * sum(stretch.processor_s for stretch in stretches)
         return replace(joined, milliseconds=spent_ms / joined.raw.shape[1])
 
-    def _smoothed(self, raw: NDArray[np.float64], run: Run) -> NDArray[np.float64]:
+    def _columns(self, raw: NDArray[np.float64], run: Run) -> Columns:
         mesh = self._sampled(1.0)
         times_s = mesh.times_s[run.start : run.stop]
         presence = mesh.presence.between(run.start, run.stop)
-        return smooth(raw, times_s, 0, 0, len(times_s), self.options, presence)
+        smoothed = smooth(raw, times_s, 0, 0, len(times_s), self.options, presence)
+        return Columns(raw, smoothed, np.full(len(times_s), run.weight))
 
     def _aside(self) -> VirtualSensor:
         self._tried += 1
@@ -359,5 +382,6 @@ def _joined(parts: Sequence[Columns]) -> Columns:
     return Columns(
         np.concatenate([part.raw for part in parts], axis=1),
         np.concatenate([part.smooth for part in parts], axis=1),
+        np.concatenate([part.weight for part in parts]),
         float(np.mean([part.milliseconds for part in parts])),
     )

@@ -184,9 +184,8 @@ def _print_choice(choice: Choice) -> None:
 
     print(choice.summary)
     errors = choice.errors
-    unseen = "not used to choose" if choice.unseen else "also used to choose: the clip is short"
     print(
-        f"  on {errors.frames} frames ({unseen}): L1 {percent(errors.l1)} after smoothing,"
+        f"  as {errors.frames} frames tell of the clip: L1 {percent(errors.l1)} after smoothing,"
         f" {percent(errors.l1_raw)} before; peak velocity off by {errors.peak_mps.median:.3g} m/s"
         f" in the median frame, by up to {errors.peak_mps.p95:.3g} m/s in 95 % of them"
     )

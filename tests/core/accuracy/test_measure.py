@@ -63,9 +63,9 @@ def test_expected_counts_are_held_against_expected_counts(scene: MeshSequence) -
     scene, finest = replace(scene, uncertainty=known), AccuracyPlan(frame_rate_factor=8)
     plain, found = replace(PRESETS["paper"], count="plain"), []
     for options in (PRESETS["paper"], plain):
-        trial = Trial(scene, CAMERA, options, take_sample(scene, options, runs=2))
+        trial = Trial(scene, CAMERA, options, take_sample(scene, CAMERA, options, runs=2))
         found.append(trial.reference(trial.sample.runs).smooth)
-        assert trial.errors(finest, trial.sample.runs).l1 < 2e-3
+        assert trial.errors(finest).l1 < 2e-3
     assert np.abs(found[0] - found[1]).sum() > 0.1 * found[1].sum()
     more = replace(scene, uncertainty=known.times(2.0))
     told = [
@@ -80,8 +80,8 @@ def test_expected_counts_are_held_against_expected_counts(scene: MeshSequence) -
 def test_facts_of_a_scene_name_how_far_its_ranges_lie_apart(depth_m: float, spread: float) -> None:
     """Two small plates, one behind the other: from half a metre before 2 m to half behind."""
     near, far = (plate((0.0, 0.0, 2.0 + side * depth_m), 0.02, 0.02) for side in (-0.5, 0.5))
-    scene = together(near, far)
-    trial = Trial(scene, CAMERA, PRESETS["paper"], take_sample(scene, PRESETS["paper"], runs=2))
+    scene, paper = together(near, far), PRESETS["paper"]
+    trial = Trial(scene, CAMERA, paper, take_sample(scene, CAMERA, paper, runs=2))
     assert scene_facts(trial).range_spread == pytest.approx(spread, abs=0.02)
 
 

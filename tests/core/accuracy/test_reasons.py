@@ -49,7 +49,7 @@ def test_a_body_half_behind_a_plate_requires_occlusion() -> None:
 
 def test_there_are_reasons_for_every_plan() -> None:
     survey = survey_scene(ball(APPROACHING, fineness=2), CAMERA, PAPER)
-    errors = survey.trial.errors(survey.base, survey.trial.sample.chosen_on)
+    errors = survey.trial.errors(survey.base)
     for plan in counting_plans(vertices_kept=survey.trial.vertices_kept):
         assert reasons_for(survey, plan, {plan: errors}, tolerance=0.9)
 

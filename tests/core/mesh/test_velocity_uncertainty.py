@@ -16,6 +16,7 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from tools.build_sample.sample import write_compact_mesh
 
@@ -136,7 +137,7 @@ def test_sampled_frames_keep_theirs() -> None:
     mesh = MeshSequence(
         vertices, None, Timebase.regular(frames, 30.0), uncertainty=known(4, frames)
     )
-    sample = take_sample(mesh, PRESETS["paper"])
+    sample = take_sample(mesh, VirtualSensor(), PRESETS["paper"])
     found = sample.of(mesh).uncertainty
     assert found is not None
     np.testing.assert_array_equal(found.along_mps, known(4, frames).along_mps[sample.frames])
