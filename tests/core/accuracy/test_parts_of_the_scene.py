@@ -65,7 +65,12 @@ def test_each_part_and_other_people_have_their_sentence() -> None:
     assert {"beam", "things", "walls", "people"} <= set(said)
     assert said["beam"].text.startswith("the beam changes this map by ")
     assert said["people"].modelled
-    assert said["people"].value > 0.2
+    options = replace(PAPER, visibility="exact")
+    together, alone = (
+        Synthesizer(one, options).map(BEAMED).values for one in (scene, replace(scene, others=()))
+    )
+    change = float(np.abs(together - alone).sum() / together.sum())
+    assert said["people"].value == pytest.approx(change, rel=0.5)
     for part in ("beam", "things", "walls"):
         assert said[part].modelled == (part not in choice.plan.left_out)
     plain = choose(body(), VirtualSensor(), tolerance=0.02)
