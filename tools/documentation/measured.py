@@ -42,14 +42,15 @@ SHARED = Path(os.environ.get("SD2_SHARED_DATA", REPOSITORY.parent / "shared" / "
 _HOURS = "hours of training, due with the next denoisers"
 OLD = {
     "performance.md": "needs an idle machine for an hour",
-    "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
+    "fitting.md": "ten idle minutes; fits are the same bit for bit",
     "range-synthesis.md": _HOURS,
     "paper.md": _HOURS,
     "denoiser.md": _HOURS,
-    "classifier.md": "since then only longer waves, several people and what lost frames changed",
+    "classifier.md": "since then longer waves, several people and what lost frames changed",
     "real-gestures.md": "since then only what lost frames has changed",
     "scale.md": "since then only how classes of data sets and maps of radars are read has changed",
     "studies.md": "since then only what lost frames, and when pairs are made anew, has changed",
+    "real-pairs.md": "since then only how a training is cancelled has changed",
 }
 """Pages that may be older than the program, and why they were not measured anew."""
 
