@@ -51,7 +51,7 @@ class LabelSetModel(RecordTableModel[Label]):
         self.label_set = self._labels.labels.label_set  # in its order
         self.rows = self.label_set.labels
         self._counts: Counter[str] = Counter()
-        self._alike: list[Alike] = []
+        self._alike: tuple[Alike, ...] = ()
         self._labels.changed.connect(self._follow)
 
     @property

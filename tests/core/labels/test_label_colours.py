@@ -11,9 +11,9 @@ from sd2core.labels.label_set import GESTURES, Label
 
 
 def test_offered_colours_differ_to_all_eyes() -> None:
-    offered = [Label(name, colour) for name, colour in OFFERED]
-    assert alike(offered) == []
-    assert alike(GESTURES.labels) == []
+    offered = tuple(Label(name, colour) for name, colour in OFFERED)
+    assert not alike(offered)
+    assert not alike(GESTURES.labels)
     assert {one.colour for one in GESTURES.labels} <= {colour for _, colour in OFFERED}
 
 
@@ -42,7 +42,7 @@ def test_a_distance_has_no_direction() -> None:
     ],
 )
 def test_a_pair_is_named_with_the_eyes_that_confuse_it(one: str, other: str, vision: str) -> None:
-    found = alike([Label("a", one), Label("b", other), Label("c", "#f0e442")])
-    assert found == [Alike("a", "b", vision)]
+    found = alike((Label("a", one), Label("b", other), Label("c", "#f0e442")))
+    assert found == (Alike("a", "b", vision),)
     assert found[0].words().startswith("a and b look alike")
     assert found[0].words().endswith(vision or "alike")
