@@ -64,6 +64,10 @@ class RawMesh:
     uncertainty: tuple[NDArray[Any], ...] | None = None  # as UNCERTAINTY_NAMES has them
     frame_numbers: NDArray[np.int64] | None = None  # (T,), of the video, when some are missing
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.notes, list):  # of a plug-in; a text would be taken letter by letter
+            raise TypeError(f"the notes are of type {type(self.notes).__name__}, not a list")
+
 
 def read_npz(path: Path) -> RawMesh:
     """Read ``vertices`` and, where present, ``faces``, ``times_s`` and ``fps``."""

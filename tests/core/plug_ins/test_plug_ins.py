@@ -262,7 +262,11 @@ class TestRefusals:
 
     @pytest.mark.parametrize(
         ("result", "words"),
-        [("None", "gives a NoneType. Expected: a RawMesh"), ("1 / 0", "failed (ZeroDivisionError")],
+        [
+            ("None", "gives a NoneType. Expected: a RawMesh"),
+            ("1 / 0", "failed (ZeroDivisionError"),
+            ("RawMesh([[[0.0, 0.0, 2.0]]], notes='Read.')", "failed (TypeError: the notes are"),
+        ],
     )
     def test_a_reader_that_fails(
         self, install: Install, points: Path, result: str, words: str
