@@ -48,7 +48,6 @@ OLD = {
     "denoiser.md": _HOURS,
     "classifier.md": "since then longer waves, several people and what lost frames changed",
     "real-gestures.md": "since then only what lost frames has changed",
-    "scale.md": "since then only how classes of data sets and maps of radars are read has changed",
     "studies.md": "since then only what lost frames, and when pairs are made anew, has changed",
     "real-pairs.md": "since then only how a training is cancelled has changed",
 }
