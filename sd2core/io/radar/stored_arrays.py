@@ -129,10 +129,11 @@ def stored_npy(path: Path, expected: str) -> StoredArray:
     at_once = max(_BLOCK_BYTES // max(each * dtype.itemsize, 1), 1)
 
     def read(place: tuple[slice, ...]) -> NDArray[Any]:
+        place += (slice(None),) * (len(shape) - len(place))
         first, *others = place[::-1] if by_column else place
         start, stop, _ = first.indices(shape[0])
         blocks = []
-        for low in range(start, stop, at_once):
+        for low in range(start, max(stop, start + 1), at_once):  # one at least: it has the shape
             words = slice(skipped + low * each, skipped + min(low + at_once, stop) * each)
             rows = read_words(path, dtype, words).reshape(-1, *shape[1:])
             blocks.append(rows[(slice(None), *others)])
