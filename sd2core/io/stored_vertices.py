@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import threading
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ class StoredVertices:
     def __init__(self, array: StoredArray, damaged: tuple[Damage, ...] = ()) -> None:
         self._array = array
         self._source = str(array.path)
+        self._kept: dict[int, NDArray[Any]] = {}  # frames by chunk number, newest last
+        self._reading = threading.Lock()
         self.damaged = damaged
         self._lost = {one.start // self.frames_per_chunk for one in damaged}  # chunk numbers
         self.scale = 1.0
@@ -33,9 +35,6 @@ class StoredVertices:
         self.shift_m = np.zeros(3, np.float32)
         self.shape: tuple[int, ...] = array.shape
         self.dtype = real_type(array.dtype)
-        # The last ones are kept, because frames are played one by one.
-        kept = max(_KEPT_BYTES // max(self.chunk_bytes, 1), 1)
-        self._chunk = lru_cache(kept)(self._chunk_from_disk)
 
     @property
     def frames_per_chunk(self) -> int:
@@ -93,6 +92,20 @@ class StoredVertices:
             chunk = self._chunk(number)
             part[first - start : last - start] = chunk[first - number * step :][: last - first]
         return part
+
+    def _chunk(self, number: int) -> NDArray[Any]:
+        """One chunk; the last ones are kept, because frames are played one by one."""
+        kept = self._kept.get(number)
+        if kept is not None:
+            return kept
+        with self._reading:
+            chunk = self._kept.get(number)
+            if chunk is None:
+                chunk = self._chunk_from_disk(number)
+                while self._kept and (len(self._kept) + 1) * self.chunk_bytes > _KEPT_BYTES:
+                    del self._kept[next(iter(self._kept))]
+                self._kept[number] = chunk
+        return chunk
 
     def _chunk_from_disk(self, number: int) -> NDArray[Any]:
         """Frames of one chunk; of a lost one, a pose that stands in for them."""

@@ -214,11 +214,11 @@ def test_chunks_are_read_once_while_there_is_room(
     for start in (20, 5, 10, 15, 0):
         np.testing.assert_array_equal(mesh.read(start, start + 5), vertices[start : start + 5])
     assert read == []
-    mesh.read(30, 40)  # in place of the one that was asked for longest ago
-    mesh.read(0, 20)
+    mesh.read(30, 40)  # in place of the oldest
+    mesh.read(10, 30)
     assert read == [30]
-    np.testing.assert_array_equal(mesh.read(20, 30), vertices[20:30])
-    assert read == [30, 20]
+    np.testing.assert_array_equal(mesh.read(0, 10), vertices[:10])
+    assert read == [30, 0]
 
 
 def test_zarr_2_groups_are_read(tmp_path: Path) -> None:
