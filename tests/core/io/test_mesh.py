@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import gc
 import re
+import weakref
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.resources import resource_path
 from sd2core.io import mesh_arrays, mesh_checks, stored_vertices
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.decimation import decimate
@@ -219,6 +222,19 @@ def test_chunks_are_read_once_while_there_is_room(
     assert read == [30]
     np.testing.assert_array_equal(mesh.read(0, 10), vertices[:10])
     assert read == [30, 0]
+
+
+def test_chunks_go_with_the_last_who_has_the_mesh() -> None:
+    """Else a batch holds those of recordings that it is done with, until the collector runs."""
+    vertices = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").vertices
+    vertices[0:10]
+    there = weakref.ref(vertices)
+    gc.disable()
+    try:
+        del vertices
+        assert there() is None
+    finally:
+        gc.enable()
 
 
 def test_zarr_2_groups_are_read(tmp_path: Path) -> None:
