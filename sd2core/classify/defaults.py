@@ -50,7 +50,7 @@ ENTRIES: Mapping[str, Architecture] = {
 MODELS = tuple(ENTRIES)
 
 CLASSIFIERS = Group("classifiers", Architecture, ENTRIES)
-"""Classifiers of other packages."""
+"""Those, and classifiers of other packages."""
 
 
 def model_names() -> tuple[str, ...]:
@@ -60,7 +60,7 @@ def model_names() -> tuple[str, ...]:
 
 def model_name(text: str) -> str:
     """Read the name of a classifier."""
-    if text in MODELS or CLASSIFIERS.find(text) is not None:
+    if text in CLASSIFIERS:
         return text
     raise ArgumentTypeError(f"{text!r} is none of {', '.join(model_names())}")
 

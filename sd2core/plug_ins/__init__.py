@@ -121,6 +121,10 @@ class Group(Generic[Kind]):
         """All that are installed, sorted by name and package."""
         return _installed(self)
 
+    def __contains__(self, name: object) -> bool:
+        """True if what is built in or a plug-in is called so."""
+        return name in self.built_in or any(one.name == name for one in self.entries)
+
     def find(self, name: str) -> PlugIn[Kind] | None:
         """The plug-in of a name, which may be of no use; None if there is none."""
         return next((one for one in self.entries if one.name == name), None)
@@ -145,7 +149,7 @@ class Group(Generic[Kind]):
 
     def check_installed(self, name: str, package: str, source: object) -> None:
         """Raise Sd2Error if what a file needs is of a package that is not installed."""
-        if package and name not in self.built_in and self.find(name) is None:
+        if package and name not in self:
             raise Sd2Error(
                 f"{source} needs {name}, a plug-in of the package {package}, which is not there",
                 f"{package} beside SD² Studio",

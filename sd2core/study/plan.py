@@ -13,7 +13,6 @@ from sd2core.classify.defaults import (
     CLASSIFIERS,
     DELAY_S,
     DELAYS_S,
-    MODELS,
     WIDTH,
     WIDTHS,
     FeatureKind,
@@ -40,7 +39,7 @@ OF_VIDEO: tuple[Added, ...] = tuple(one for one in ADDED if one != "simulated")
 
 
 def _learner_name(name: str) -> str:
-    if name != "ridge" and name not in MODELS and CLASSIFIERS.find(name) is None:
+    if name != "ridge" and name not in CLASSIFIERS:
         raise PydanticCustomError("name", f"one of ridge, {', '.join(model_names())}")
     return name
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, get_args
@@ -15,7 +15,7 @@ from sd2app.background.runs import Runs, RunSetup, Source, free_folder
 from sd2app.settings import Settings, StoredChoices
 from sd2app.training.run import StepHistory
 from sd2app.widgets.text import counted, duration_text, quoted
-from sd2core.classify.defaults import DELAYS_S, FeatureKind, model_names, pace_kind
+from sd2core.classify.defaults import CLASSIFIERS, DELAYS_S, FeatureKind, pace_kind
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.cli.classify.comparison import Table
 from sd2core.cli.classify.train import Train
@@ -91,7 +91,9 @@ class ClassSetup(RunSetup[DataSource]):
     kind = DataSource
 
     def __init__(self, settings: Settings, parent: QObject) -> None:
-        known = {"features": get_args(FeatureKind), "model": model_names(), "delay_s": DELAYS_S}
+        known: dict[str, Container[Any]] = {
+            "features": get_args(FeatureKind), "model": CLASSIFIERS, "delay_s": DELAYS_S
+        }  # fmt: skip
         values = StoredChoices(settings, "classify/train", _DEFAULTS, known)
         people = settings.table(_PEOPLE)
         data = [DataSource(path, str(people.get(str(path), ""))) for path in settings.paths(_DATA)]

@@ -16,7 +16,7 @@ from small_pairs import write_pairs
 
 from sd2app.classify.feature import recall_text
 from sd2app.classify.model import note, run_headline
-from sd2app.classify.run import ClassTraining
+from sd2app.classify.run import ClassSetup, ClassTraining
 from sd2app.command_line import full_parser, main
 from sd2app.settings import Settings
 from sd2app.training.run import division_text
@@ -29,6 +29,7 @@ from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.labels.field_edits import rename_persons
+from sd2core.plug_ins import Group
 from sd2core.runs.command_folder import CommandFolder, last_output
 from sd2core.runs.pace import keep_pace
 from sd2core.runs.progress import ProgressTail
@@ -66,6 +67,17 @@ def set_up(qtbot, tmp_path):
 def typed(words: list[str]) -> object:
     """The command that words are understood as."""
     return record_of(full_parser().parse_args(words))
+
+
+@pytest.mark.parametrize(("kept", "is_"), [("s4", "s4"), ("of-none", Train.model)])
+def test_plug_ins_are_looked_for_only_where_a_kept_name_is_unknown(monkeypatch, kept, is_):
+    settings, looked = Settings.forgetful(), []
+    settings.set_value("classify/train/model", kept)
+    monkeypatch.setattr(Group, "entries", property(lambda group: looked.append(group.name) or ()))
+    setup = ClassSetup(settings, None)
+    assert setup.value("model") == is_
+    assert looked == ([] if kept == is_ else ["classifiers"])
+    setup.close()
 
 
 def test_what_is_set_up_is_the_command(set_up):
