@@ -28,6 +28,11 @@ _SPIKE_S = 0.1
 _NOISE_M = 0.06
 _SIGMAS = 6.0
 _ROUNDS = 5
+_JUMP, _STILL_MPS = 4.0, 0.3
+"""How many times faster than around it, and than noise, a body jumps; of all trials of CMU's motion
+capture, at 30, 15 and 10 frames/s, three do so, in frames that are broken."""
+_SLOW_S = 0.11
+"""Between frames that are farther apart a body may start and stop again."""
 _BRIDGED_VISIBILITY = 0.25
 _NAMED = 4
 """Stretches that a note names at most."""
@@ -149,6 +154,31 @@ def on_cubics(times_s: Floats, values: NDArray[Any], wrong: NDArray[np.bool_]) -
     return filled
 
 
+# -- Jumps ---------------------------------------------------------------------------------------
+
+
+def find_jumps(track: RawTrack) -> NDArray[np.bool_]:
+    """Frames (T,) to which the whole body jumps, as after a cut in the video.
+
+    Half of the landmarks move by far more there than from frame to frame just before and after; a
+    fast limb is not half of them, and a fast body needs several frames to start and to stop. In the
+    two frames beside a gap, a jump and either end nothing is known of it.
+    """
+    jumps = np.zeros(len(track.times_s), bool)
+    rows = np.flatnonzero(track.present)
+    if len(rows) < 6:
+        return jumps
+    scale = pixels_per_metre(track)[rows, None]
+    places = np.stack([place_m(track, rows, scale, n) for n in range(len(LANDMARKS))])  # (33, N, 5)
+    step_s = np.diff(track.times_s[rows])
+    moved_m = np.median(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=0)  # (N - 1,)
+    known = (np.diff(rows) == 1) & (step_s < _SLOW_S)
+    speed_mps = np.pad(np.where(known, moved_m / step_s, np.inf), 2, constant_values=np.inf)
+    around = np.lib.stride_tricks.sliding_window_view(speed_mps, 5)[:, [0, 1, 3, 4]].max(axis=1)
+    jumps[rows[1:]] = known & (speed_mps[2:-2] > _JUMP * np.maximum(around, _STILL_MPS))
+    return jumps
+
+
 # -- Gaps ----------------------------------------------------------------------------------------
 
 
@@ -194,7 +224,7 @@ def repair_landmarks(
     unclear : bool ndarray, (T,), optional
         Frames in which whoever is there may be another person; None: in none.
     """
-    swapped = find_side_swaps(found)
+    jumps, swapped = find_jumps(found), find_side_swaps(found)
     whole = RawTrack(**{name: values.copy() for name, values in vars(found).items()})
     replaced = np.zeros(found.visibility.shape, bool)
     for start, stop in parts(len(found.times_s)):
@@ -207,8 +237,9 @@ def repair_landmarks(
         mended = bridge_gaps(track, max_gap_s).part(start - first, stop - first)
         for name, values in vars(mended).items():
             getattr(whole, name)[start:stop] = values
+    whole.present[jumps] = False
     unclear = np.zeros(len(replaced), bool) if unclear is None else unclear
-    return whole, _sentences(whole, swapped, replaced, max_gap_s, unclear)
+    return whole, _sentences(whole, swapped, replaced, max_gap_s, unclear, jumps)
 
 
 def _around(
@@ -242,6 +273,7 @@ def _sentences(
     replaced: NDArray[np.bool_],
     max_gap_s: float,
     unclear: NDArray[np.bool_],
+    jumps: NDArray[np.bool_],
 ) -> tuple[str, ...]:
     """Sentences on a repaired clip: frames of parts that were swapped, and outliers (T, 33)."""
     notes = [
@@ -255,16 +287,20 @@ def _sentences(
             f" {_count(int(replaced.sum()), 'outlying landmark')} in"
             f" {_count(int(replaced.any(axis=1).sum()))}."
         )
-    missing, bridged = ~track.present, track.bridged
+    missing, bridged = ~track.present & ~jumps, track.bridged
     if bridged.any():
         notes.append(
             f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
             f" {_count(int(bridged.sum()))}."
         )
     for which, why in (
+        (jumps, "Left empty, because the body jumps as after a cut in the video"),
         (missing & ~unclear, "Left empty, without the person"),
         (missing & unclear, "Left empty, because whoever is seen may be somebody else"),
-        (~missing & ~bridged & unclear, "Found again elsewhere and known by their looks alone"),
+        (
+            track.present & ~bridged & unclear,
+            "Found again elsewhere and known by their looks alone",
+        ),
     ):
         if which.any():
             notes.append(f"{why}: {_which(which)}.")

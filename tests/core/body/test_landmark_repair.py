@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from seen_people import somebody
 
 from sd2core.body.landmark_repair import (
     bridge_gaps,
+    find_jumps,
     find_spikes,
     repair_landmarks,
     replace_outliers,
@@ -20,6 +23,7 @@ from sd2core.body.raw_track import RawTrack, pixels_per_metre
 from sd2core.body.roi import PLACES, Sightings
 from sd2core.body.sides import swap_sides
 from sd2core.body.track import LANDMARKS
+from tools.motion_capture.catalogue import trials
 
 PX_PER_M = 150.0
 CENTRE_PX = np.array([320.0, 240.0])
@@ -212,6 +216,46 @@ class TestGaps:
         assert notes == ("Left empty, without the person: 20 frames (0 to 19).",)
 
 
+class TestJumps:
+    @settings(max_examples=20, deadline=None)
+    @given(
+        rate_hz=st.sampled_from([10.0, 15.0, 25.0, 30.0, 60.0]),
+        cut=st.integers(3, 26),
+        aside_m=st.floats(0.3, 2.0),
+    )
+    def test_a_cut_is_left_empty_and_said(self, rate_hz: float, cut: int, aside_m: float) -> None:
+        times = np.arange(30) / rate_hz
+        found = waving(times)
+        found.image_px[cut:, :, 0] += np.float32(PX_PER_M * aside_m)
+        mended, notes = repaired(found, 0.5)
+        assert np.flatnonzero(~mended.present).tolist() == [cut]
+        assert not mended.bridged.any()
+        assert f"the body jumps as after a cut in the video: 1 frame ({cut})." in notes[-1]
+
+    @settings(max_examples=30, deadline=None)
+    @given(
+        rate_hz=st.sampled_from([10.0, 15.0, 30.0, 60.0]),
+        far_m=st.floats(0.0, 3.0),
+        duration_s=st.floats(0.25, 1.0),
+        begin_s=st.floats(0.2, 1.0),
+        noise_m=st.floats(0.0, 0.01),
+    )
+    def test_no_motion_of_a_body_is_one(
+        self, rate_hz: float, far_m: float, duration_s: float, begin_s: float, noise_m: float
+    ) -> None:
+        times = np.arange(0.0, 2.5, 1.0 / rate_hz)
+        points = np.repeat(standing()[None], len(times), axis=0)
+        points[..., 0] += far_m * minimum_jerk((times - begin_s) / duration_s)[:, None]
+        points += np.random.default_rng(1).normal(0.0, noise_m, points.shape)
+        assert not find_jumps(found_from(points, times)).any()
+
+    def test_nor_is_a_limb_that_is_seen_elsewhere_at_once(self) -> None:
+        found = waving(np.arange(30) / 30.0)
+        arm = [LANDMARKS.index(f"{part}.R") for part in ("elbow", "wrist", "index", "pinky")]
+        found.image_px[15:, arm] += np.float32(PX_PER_M * 0.4)
+        assert not find_jumps(found).any()
+
+
 def test_what_was_done_is_said() -> None:
     true = somebody(1)
     spoilt = swap_sides(true, "the arms", at(90, 40, 41))
@@ -248,3 +292,18 @@ def test_who_else_was_seen_is_said() -> None:
 def test_pixels_of_a_metre() -> None:
     found = waving(np.arange(10) / 30.0)
     np.testing.assert_allclose(pixels_per_metre(found), PX_PER_M, rtol=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [1, 2, 3])
+def test_motion_capture_jumps_where_it_is_broken_alone(shared_data: Path, step: int) -> None:
+    broken = set()
+    for trial in trials(shared_data / "motion"):
+        if trial.episode is not None:
+            continue
+        points_m, rate_hz = trial.points()
+        points_m = points_m[::step, np.arange(33) % points_m.shape[1]]
+        found = found_from(points_m, np.arange(len(points_m)) * step / rate_hz)
+        if find_jumps(found).any():
+            broken.add(trial.name)
+    assert broken <= {"01_07", "03_02", "09_10"}
