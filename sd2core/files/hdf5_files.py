@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from sd2core.files.limits import (
     open_regular,
     read_limit_bytes,
 )
+from sd2core.files.texts import reading_as
 
 _DEFLATE = 1
 _FILTERS = {_DEFLATE, 2, 3, 32000}
@@ -36,17 +36,9 @@ def open_hdf5_file(path: Path, expected: str) -> Any:
         return h5py.File(path, "r")
 
 
-@contextmanager
-def refusing_damage(path: Path, expected: str) -> Iterator[None]:
+def refusing_damage(path: Path, expected: str) -> AbstractContextManager[None]:
     """Raise Sd2Error for whatever fails while an HDF5 file is open: a damaged one does so."""
-    try:
-        yield
-    except Sd2Error:
-        raise
-    except Exception as error:  # in many ways
-        raise Sd2Error(
-            f"{path} cannot be read as HDF5 ({error})", expected, "Copy or download it again"
-        ) from error
+    return reading_as("HDF5", path, expected, "Copy or download it again")
 
 
 def member_of(file: Any, path: Path, name: str) -> Any:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular, check_size, open_regular, size_bytes
+from sd2core.files.texts import reading_as
 
 
 class NpzArrays(Mapping[str, NDArray[Any]]):
@@ -86,11 +87,8 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
 def open_npy_file(path: Path, expected: str, remedy: str = "") -> NDArray[Any]:
     """Map the array in an ``.npy``, so that what its header says is compared with its size."""
     check_regular(path)
-    try:
+    with reading_as("an array", f"{path} ({size_bytes(path)} bytes)", expected, remedy):
         return np.load(path, mmap_mode="r", allow_pickle=False)
-    except Exception as error:  # a damaged header fails in many ways
-        found = f"{path} ({size_bytes(path)} bytes) cannot be read as an array ({error})"
-        raise Sd2Error(found, expected, remedy) from error
 
 
 def read_words(path: Path, kind: np.dtype[Any], place: slice) -> NDArray[Any]:

@@ -15,7 +15,7 @@ import os
 import stat
 import zipfile
 from collections.abc import Iterable, Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -34,6 +34,7 @@ from sd2core.files.limits import (
     size_bytes,
 )
 from sd2core.files.numpy_files import open_zip
+from sd2core.files.texts import cause_of, reading_as
 from sd2core.progress import Progress, silent
 
 Depth = Literal["presence", "lengths", "checksums", "values"]
@@ -42,7 +43,7 @@ Depth = Literal["presence", "lengths", "checksums", "values"]
 _DESCRIPTIONS = ("zarr.json", ".zgroup", ".zarray", ".zattrs", ".zmetadata")
 _PARSED = 8
 """Memory of a description once it is parsed, as a multiple of its text, at least."""
-COPY_AGAIN = "Copy it again from where it came, or write it again"
+_WHOLE, COPY_AGAIN = "a complete Zarr store", "Copy it again from where it came, or write it again"
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class StoredArray:
             return np.asarray(self._array[key])
         except Exception as error:  # a damaged chunk fails in the codec's own ways
             self._refuse(self.damage("values", _rows(key, self.shape)))
-            raise unreadable(self.path, f"{self.name} ({_error_text(error)})") from error
+            raise unreadable(self.path, f"{self.name} ({cause_of(error)})") from error
 
     def _refuse(self, damage: tuple[Damage, ...]) -> None:
         if damage:
@@ -178,7 +179,7 @@ class StoredArray:
         except DamagedChunkError as error:
             return f"{key}: {error}"
         except Exception as error:  # a damaged zip fails in many ways, too
-            return f"{key}: {_error_text(error)}"
+            return f"{key}: {cause_of(error)}"
         if summed and crc32c(content[:-4]).to_bytes(4, "little") != content[-4:]:
             return f"{key} does not have its checksum"
         return self._undecodable(place, key) if depth == "values" else None
@@ -197,7 +198,7 @@ class StoredArray:
         try:
             self._array.blocks[place]
         except Exception as error:  # as in __getitem__
-            return f"{key}: {_error_text(error)}"
+            return f"{key}: {cause_of(error)}"
         return None
 
 
@@ -223,7 +224,7 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
 
     import sd2core.files.chunk_codecs  # noqa: F401  puts checks before the decoders
 
-    try:
+    with _reading(path):
         packed = path.is_file()
         if packed:
             with open_zip(path) as archive:
@@ -241,10 +242,6 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
                     check_fetched(next(chunks, None))
         group = zarr.open_group(ZipStore(path, mode="r") if packed else str(path), mode=mode)
         _check_declared(group, path, files)
-    except Sd2Error:
-        raise
-    except Exception as error:  # damaged descriptions fail in many ways
-        raise _no_group(path, error) from error
     return group
 
 
@@ -309,15 +306,10 @@ def array_in(
     Sd2Error
         If the array is missing, or its description is damaged or not safe.
     """
-    try:
-        return StoredArray(group[name], path, name, unit, sparse=sparse)
-    except Sd2Error:
-        raise
-    except KeyError as error:
-        missing = f"{path}: the array {name} is missing"
-        raise Sd2Error(missing, "a complete Zarr store", COPY_AGAIN) from error
-    except Exception as error:
-        raise _no_group(path / name, error) from error
+    with _reading(path / name):
+        if (array := group.get(name)) is None:
+            raise Sd2Error(f"{path}: the array {name} is missing", _WHOLE, COPY_AGAIN)
+        return StoredArray(array, path, name, unit, sparse=sparse)
 
 
 def growing(group: Any, path: Path, name: str) -> Any:
@@ -370,16 +362,8 @@ def unreadable(path: Path, damage: str | Iterable[Damage]) -> Sd2Error:
     return Sd2Error(f"{path} cannot be read: {what}", "chunks as they were written", COPY_AGAIN)
 
 
-def _no_group(path: Path, error: Exception) -> Sd2Error:
-    return Sd2Error(
-        f"{path} cannot be read as a Zarr group ({_error_text(error)})",
-        "a complete Zarr store",
-        COPY_AGAIN,
-    )
-
-
-def _error_text(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}"[:200]
+def _reading(path: Path) -> AbstractContextManager[None]:
+    return reading_as("a Zarr group", path, _WHOLE, COPY_AGAIN)
 
 
 def _rows(key: Any, shape: tuple[int, ...]) -> range | None:

@@ -202,6 +202,31 @@ def damage_in(place: str | Path, expected: str = "") -> Iterator[None]:
         raise Sd2Error(f"{place}: its description is damaged ({error!r})", expected) from error
 
 
+@contextmanager
+def reading_as(form: str, place: str | Path, expected: str, remedy: str = "") -> Iterator[None]:
+    """Raise Sd2Error for whatever fails while a file is read: libraries fail in many ways.
+
+    Parameters
+    ----------
+    form : str
+        What it is read as, for the error.
+    place, expected, remedy
+        As for :func:`parse_json`.
+    """
+    try:
+        yield
+    except Sd2Error:
+        raise
+    except Exception as error:
+        found = f"{place} cannot be read as {form} ({cause_of(error)})"
+        raise Sd2Error(found, expected, remedy) from error
+
+
+def cause_of(error: BaseException) -> str:
+    """Kind of an error of a library, and its words, for a message of ours."""
+    return f"{type(error).__name__}: {error}"[:200]
+
+
 def check_version(
     content: Any,
     place: Path | str,

@@ -14,6 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular, check_size
 from sd2core.files.numpy_files import open_npy_file, open_npz_file
 from sd2core.files.paths import files_of_pattern
+from sd2core.files.texts import reading_as
 from sd2core.io.frame_names import frames_among, numbered_frames
 from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
@@ -86,7 +87,7 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
 
     kind = path.suffix[1:].lower()
     check_regular(path)
-    try:
+    with reading_as("a mesh", path, "a complete OBJ, PLY or GLB file", "Export it again"):
         content = path.read_bytes()
         if kind == "obj":
             content = _geometry_of_obj(content)
@@ -100,14 +101,6 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
         if isinstance(loaded, trimesh.Scene):
             loaded = loaded.to_geometry() if len(loaded.geometry) else trimesh.Trimesh()
         vertices = np.asarray(loaded.vertices, dtype=np.float64)
-    except Sd2Error:
-        raise
-    except Exception as error:  # trimesh's readers raise whatever their parsing meets
-        raise Sd2Error(
-            f"{path} cannot be read as a mesh ({type(error).__name__}: {error})",
-            "a complete OBJ, PLY or GLB file",
-            "Export it again",
-        ) from error
     if vertices.ndim != 2 or not len(vertices):
         raise Sd2Error(f"{path} holds no vertices", "a mesh or a point cloud", "Export it again")
     faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)

@@ -26,6 +26,7 @@ import numpy as np
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import VARIABLE, check_regular, read_limit_bytes
 from sd2core.files.numpy_files import open_zip, read_array_header
+from sd2core.files.texts import reading_as
 from sd2core.io.pickle_objects import (
     ALLOWED,
     CALLED,
@@ -228,30 +229,20 @@ def _read(
 ) -> Any:
     """Read by ``content``, within a limit; whatever goes wrong is an Sd2Error."""
     check_regular(path)
-    try:
-        if limit_bytes is None:
-            limit_bytes = read_limit_bytes(path.stat().st_size)
-        return content(limit_bytes)
-    except Refused as refusal:
-        raise Sd2Error(
-            f"{path} {refusal}",
-            "plain NumPy arrays, numbers, text, lists and dictionaries",
-            f"{_REMEDY}{_RAISE if isinstance(refusal, TooLarge) else ''}",
-        ) from refusal
-    except Sd2Error:
-        raise
-    except MemoryError as error:
-        raise Sd2Error(
-            f"{path} asks for more memory than there is", "the size that is really stored", _REMEDY
-        ) from error
-    except RecursionError as error:
-        raise Sd2Error(f"{path} is nested too deeply", "plain data", _REMEDY) from error
-    except Exception as error:  # a damaged stream of opcodes fails in any way whatever
-        raise Sd2Error(
-            f"{path} cannot be read as a pickle ({type(error).__name__}: {error})",
-            f"a complete file written by {writer}",
-            _REMEDY,
-        ) from error
+    with reading_as("a pickle", path, f"a complete file written by {writer}", _REMEDY):
+        try:
+            return content(limit_bytes or read_limit_bytes(path.stat().st_size))
+        except Refused as refusal:
+            raise Sd2Error(
+                f"{path} {refusal}",
+                "plain NumPy arrays, numbers, text, lists and dictionaries",
+                f"{_REMEDY}{_RAISE if isinstance(refusal, TooLarge) else ''}",
+            ) from refusal
+        except MemoryError as error:
+            found = f"{path} asks for more memory than there is"
+            raise Sd2Error(found, "the size that is really stored", _REMEDY) from error
+        except RecursionError as error:
+            raise Sd2Error(f"{path} is nested too deeply", "plain data", _REMEDY) from error
 
 
 # The form of the standard library that is written in Python, because joblib's

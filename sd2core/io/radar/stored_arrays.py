@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_regular, check_size
 from sd2core.files.numpy_files import open_npy_file, read_words
-from sd2core.files.texts import faults_in, read_json
+from sd2core.files.texts import faults_in, read_json, reading_as
 
 META, DATA = ".sigmf-meta", ".sigmf-data"
 HDF5_SUFFIXES = (".h5", ".hdf5")
@@ -233,14 +233,8 @@ def _matlab_arrays(path: Path) -> list[tuple[str, tuple[int, ...], str]]:
         return [(str(name), tuple(map(int, shape)), kind) for name, shape, kind in whosmat(path)]
 
 
-@contextmanager
-def _matlab_damage(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except Exception as error:  # a damaged file fails in many ways
-        raise Sd2Error(
-            f"{path} cannot be read as MATLAB's ({error})", "a whole .mat", "Copy it again"
-        ) from error
+def _matlab_damage(path: Path) -> AbstractContextManager[None]:
+    return reading_as("MATLAB's", path, "a whole .mat", "Copy it again")
 
 
 def _sigmf(path: Path) -> StoredArray:
