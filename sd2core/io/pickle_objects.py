@@ -171,7 +171,7 @@ class Storage:
         self.values = np.frombuffer(content, self.dtype, self.count)
 
 
-def tensor_array(storage: Any, offset: Any, shape: Any, steps: Any, *_: Any) -> NDArray[Any]:
+def _tensor(storage: Any, offset: Any, shape: Any, steps: Any, *_: Any) -> NDArray[Any]:
     """``torch._utils._rebuild_tensor_v2``: an array that sees a part of a storage."""
     if not isinstance(storage, Storage) or storage.values is None:
         raise Refused("holds a torch tensor without numbers")
@@ -207,8 +207,11 @@ def _reconstructed(kind: Any, base: Any = None, state: Any = None) -> Any:
 _MAX_REPEATED_BYTES = 64 * 2**20
 
 
-class _Name:
-    """A class that may be named (an array's type) but neither called nor built."""
+class Named:
+    """A class that may be named, as an array's type or a factory, but neither called nor built."""
+
+    def __init__(self, kind: type) -> None:
+        self.kind = kind
 
 
 def _array(content: Any, dtype: Any, shape: Any, order: Any) -> NDArray[Any]:
@@ -285,9 +288,10 @@ def _bytes(content: Any = b"") -> bytes:
 
 def _default_dict(factory: Any = None, *content: Any) -> collections.defaultdict[Any, Any]:
     """``collections.defaultdict`` with one of the plain types as its factory."""
-    if factory is not None and factory not in _FACTORIES:
+    kind = factory.kind if isinstance(factory, Named) else factory
+    if kind not in (None, set, *_FACTORIES):
         raise Refused("holds a defaultdict with a factory that is not a plain type")
-    return collections.defaultdict(factory, *content)
+    return collections.defaultdict(kind, *content)
 
 
 DESCRIBED = (ChumpyArray, SparseMatrix, ColumnMatrix)
@@ -295,24 +299,24 @@ _STORAGES = {
     **{"Float": "<f4", "Double": "<f8", "Half": "<f2", "Bool": "?", "Byte": "u1", "Char": "i1"},
     **{"Short": "<i2", "Int": "<i4", "Long": "<i8"},
 }
-_FACTORIES = (dict, list, set, int, float, str, bool)
+_FACTORIES = (dict, list, int, float, str, bool)
 ALLOWED: dict[tuple[str, str], Any] = {
-    **{("builtins", kind.__name__): kind for kind in (*_FACTORIES, frozenset, complex)},
+    **{("builtins", kind.__name__): Named(kind) for kind in (*_FACTORIES, object)},
+    **{("builtins", kind.__name__): kind for kind in (set, frozenset, complex)},
     ("builtins", "bytes"): _bytes,
     ("builtins", "bytearray"): _bytearray,
     ("collections", "OrderedDict"): collections.OrderedDict,
     ("collections", "defaultdict"): _default_dict,
     ("_codecs", "encode"): _encode,
     ("numpy", "dtype"): PlainDtype,
-    ("numpy", "ndarray"): _Name(),
-    ("numpy", "memmap"): _Name(),
+    ("numpy", "ndarray"): Named(np.ndarray),
+    ("numpy", "memmap"): Named(np.ndarray),
     ("joblib.numpy_pickle", "NumpyArrayWrapper"): JoblibArray,
-    ("builtins", "object"): _Name(),
     ("copy_reg", "_reconstructor"): _reconstructed,
     ("copyreg", "_reconstructor"): _reconstructed,
     ("chumpy.ch", "Ch"): ChumpyArray,
     ("chumpy.reordering", "Select"): ChumpyArray,
-    ("torch._utils", "_rebuild_tensor_v2"): tensor_array,
+    ("torch._utils", "_rebuild_tensor_v2"): _tensor,
     ("torch._utils", "_rebuild_parameter"): _parameter,
     **{("torch", f"{name}Storage"): StorageKind(code) for name, code in _STORAGES.items()},
 }
@@ -324,21 +328,5 @@ for _core in ("numpy.core", "numpy._core"):
     ALLOWED[f"{_core}.multiarray", "_reconstruct"] = _new_array
     ALLOWED[f"{_core}.multiarray", "scalar"] = _scalar
     ALLOWED[f"{_core}.numeric", "_frombuffer"] = _array
-    ALLOWED[f"{_core}.memmap", "memmap"] = _Name()
+    ALLOWED[f"{_core}.memmap", "memmap"] = Named(np.ndarray)
 OF_A_LIST = (set, frozenset, collections.OrderedDict)
-COPIES = (*OF_A_LIST, bytes, bytearray)
-CALLED = (
-    *OF_A_LIST,
-    complex,
-    _bytes,
-    _bytearray,
-    _default_dict,
-    _encode,
-    PlainDtype,
-    _new_array,
-    _scalar,
-    _array,
-    tensor_array,
-    _parameter,
-    _reconstructed,
-)

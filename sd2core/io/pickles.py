@@ -29,19 +29,17 @@ from sd2core.files.numpy_files import open_zip, read_array_header
 from sd2core.files.texts import reading_as
 from sd2core.io.pickle_objects import (
     ALLOWED,
-    CALLED,
-    COPIES,
     DESCRIBED,
     OF_A_LIST,
     Described,
     JoblibArray,
+    Named,
     PlainArray,
     PlainDtype,
     Refused,
     Storage,
     StorageKind,
     TooLarge,
-    tensor_array,
 )
 
 _PIECE = 16 * 2**20
@@ -282,16 +280,14 @@ class _DataUnpickler(_Machine):
         raise Refused("refers to objects outside the file (a persistent id)")
 
     def load_reduce(self) -> None:
-        """Call only what stands in the list, containers only with a list."""
+        """Call what was found in the list, as nothing else can be called; containers of a list."""
         function, arguments = self.stack[-2:]
-        if not any(function is called for called in (*CALLED, _storage_of_bytes)):
+        if not callable(function):
             raise Refused(f"calls {_named(function)}, which is forbidden")
         if function in OF_A_LIST and not all(isinstance(a, list | tuple) for a in arguments):
             raise Refused(f"builds {_named(function)} from something else than a list")
         super().load_reduce()
-        made = self.stack[-1]
-        self._source.charge(sys.getsizeof(made) if isinstance(made, COPIES) else 0)
-        self._source.charge(made.nbytes if function is tensor_array else 0)
+        self._source.charge(sys.getsizeof(self.stack[-1]))
 
     def load_newobj(self) -> None:
         """Make an object that stands for an array, of joblib, chumpy or scipy."""
@@ -392,4 +388,5 @@ def _storage_of_bytes(content: Any) -> Storage:
 
 
 def _named(thing: Any) -> str:
+    thing = thing.kind if isinstance(thing, Named) else thing
     return f"'{thing.__name__}'" if isinstance(thing, type) else f"a {type(thing).__name__}"
