@@ -34,7 +34,7 @@ from sd2core.io.mesh_models import is_estimate, read_model_output
 from sd2core.io.readers import MESH_FILES, FileReader, MeshHints, plug_in_for
 from sd2core.io.stored_vertices import StoredVertices, real_type
 from sd2core.io.things import with_things, with_walls
-from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.sequence import MeshSequence, check_shape
 from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
 from sd2core.progress import Progress, silent
@@ -258,13 +258,7 @@ def _as_vertices(raw: RawMesh, source: str) -> None:
             )
         vertices = vertices.astype(real_type(vertices.dtype), copy=False)
         raw.vertices = vertices[None] if vertices.ndim == 2 else vertices
-    shape = tuple(raw.vertices.shape)
-    if len(shape) != 3 or shape[2] != 3 or 0 in shape:
-        raise Sd2Error(
-            f"{source}: the vertices have shape {shape}",
-            "(frames, vertices, 3), none of them zero",
-            "Transpose or cut the array where the file is written",
-        )
+    check_shape(tuple(raw.vertices.shape), source)
 
 
 def _place(raw: RawMesh, scale: float, turn: str | None, distance_m: float) -> None:

@@ -13,7 +13,7 @@ from sd2core.files.texts import errors_in
 from sd2core.io.mesh_arrays import RawMesh
 from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.presence import checked
-from sd2core.mesh.sequence import VertexArray, place_in_words
+from sd2core.mesh.sequence import VertexArray, checked_faces, place_in_words
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.numerics.precision import ROUNDING, SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.plausibility.clock import judge_clock
@@ -29,8 +29,7 @@ from sd2core.sensor import VelocityAxis
 _SAMPLE_FRAMES = 5
 _POINTS = 128
 """Vertices of a frame whose motion is judged."""
-_STRETCH_FRAMES = 64
-_JUDGED_BYTES, _JUDGED_ON_DISK_BYTES = 512 * 2**20, 32 * 2**20
+_STRETCH_FRAMES, _JUDGED_ON_DISK_BYTES = 64, 32 * 2**20
 _MIN_VERTICES = 3
 """Of so few vertices nothing is judged: they are no body."""
 _CLOSED_SHARE = 0.95
@@ -201,16 +200,14 @@ def judge_body(raw: RawMesh, times_s: NDArray[np.float64]) -> None:
 
 
 def _stretches(vertices: VertexArray) -> list[tuple[int, int]]:
-    """Frames that are judged, all of them or stretches spread evenly."""
+    """Frames that are judged: all in memory, of those on disk stretches spread evenly."""
     frames = int(vertices.shape[0])
-    frame_bytes = int(np.prod(vertices.shape[1:])) * np.dtype(vertices.dtype).itemsize
-    length, most_bytes = _STRETCH_FRAMES, _JUDGED_BYTES
-    if isinstance(vertices, StoredVertices):
-        most_bytes = _JUDGED_ON_DISK_BYTES
-        if not vertices.large_chunks:
-            length = vertices.frames_per_chunk
+    if not isinstance(vertices, StoredVertices):
+        return [(0, frames)]
+    length = _STRETCH_FRAMES if vertices.large_chunks else vertices.frames_per_chunk
+    frame_bytes = vertices.chunk_bytes // vertices.frames_per_chunk
     starts = np.arange(0, frames, length)
-    most = max(most_bytes // (length * frame_bytes), 1)
+    most = max(_JUDGED_ON_DISK_BYTES // (length * frame_bytes), 1)
     if len(starts) > most:
         starts = starts[np.linspace(0, len(starts) - 1, most).astype(int)]
     return [(int(start), min(int(start) + length, frames)) for start in starts]
@@ -265,27 +262,12 @@ def _note_missing_faces(raw: RawMesh) -> None:
 
 
 def _check_faces(raw: RawMesh, vertices: NDArray[np.float64], source: str) -> None:
-    faces = np.asarray(raw.faces)
-    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iuf":
-        raise Sd2Error(
-            f"{source}: the faces have shape {faces.shape} and type {faces.dtype}",
-            "(faces, 3): three vertex numbers per triangle",
-            "Triangulate the surface where the file is written",
-        )
-    if faces.dtype.kind == "f" and not (faces == np.floor(faces)).all():
-        raise Sd2Error(f"{source}: face numbers are not whole", "vertex numbers such as 0, 1, 2")
-    faces = faces.astype(np.int64)
-    last = len(vertices) - 1
-    if faces.size and faces.min() == 1 and faces.max() == last + 1:
-        faces = faces - 1
+    numbers = np.asarray(raw.faces)
+    plain = numbers.dtype.kind in "iuf" and numbers.size > 0
+    if plain and numbers.min() == 1 and numbers.max() == len(vertices):
+        numbers = numbers - 1
         raw.notes.append("The faces number the vertices from 1; they are read as such.")
-    if faces.size and not (faces.min() >= 0 and faces.max() <= last):
-        bad = int(faces.max()) if faces.max() > last else int(faces.min())
-        raise Sd2Error(
-            f"{source}: a face names vertex {bad}, the mesh has {last + 1:,} vertices",
-            f"vertex numbers from 0 to {last}",
-            "Give the faces that belong to this mesh (--faces)",
-        )
+    faces = checked_faces(numbers, len(vertices), source)
     corners = vertices[faces]  # (F, 3, 3)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     empty = int((np.linalg.norm(normals, axis=1) < 1e-12).sum())
@@ -302,16 +284,16 @@ def _check_faces(raw: RawMesh, vertices: NDArray[np.float64], source: str) -> No
     elif closed >= _CLOSED_SHARE and _signed_volume(vertices, faces) < 0:
         faces = faces[:, ::-1]
         raw.notes.append("The faces looked inwards (clockwise from outside); they are turned over.")
-    raw.faces = np.ascontiguousarray(faces, dtype=np.int32)
+    raw.faces = np.ascontiguousarray(faces)
 
 
-def _edge_shares(faces: NDArray[np.int64]) -> tuple[float, float]:
+def _edge_shares(faces: NDArray[np.int32]) -> tuple[float, float]:
     """Shares of edges that two faces use in opposite directions, and in the same."""
     if not faces.size:
         return 0.0, 0.0
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     forward = edges[:, 0] < edges[:, 1]
-    span = int(edges.max()) + 1
+    span = np.int64(edges.max()) + 1
     key = edges.min(axis=1) * span + edges.max(axis=1)
     _, inverse = np.unique(key, return_inverse=True)
     along = np.bincount(inverse, weights=forward)
@@ -321,7 +303,7 @@ def _edge_shares(faces: NDArray[np.int64]) -> tuple[float, float]:
     return float(closed.mean()), float(mixed.mean())
 
 
-def _signed_volume(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
+def _signed_volume(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
     corners = vertices[faces] - vertices.mean(axis=0)
     turned = np.cross(corners[:, 1], corners[:, 2])
     return float(np.einsum("ij,ij->", corners[:, 0], turned)) / 6.0

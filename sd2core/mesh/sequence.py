@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.mesh.bodies import Body, persons_of
@@ -103,22 +103,18 @@ class MeshSequence:
     simulated: bool = False
 
     def __post_init__(self) -> None:
-        shape = tuple(self.vertices.shape)
-        if len(shape) != 3 or shape[2] != 3 or 0 in shape:
-            raise Sd2Error(
-                f"{self.source or 'The mesh'}: vertices have shape {shape}",
-                "(frames, vertices, 3), none of them zero",
-            )
+        shape, name = tuple(self.vertices.shape), self.source or "The mesh"
+        check_shape(shape, name)
         if shape[0] != len(self.timebase):
             raise Sd2Error(
-                f"{self.source or 'The mesh'}: {shape[0]} frames but {len(self.timebase)} times",
+                f"{name}: {shape[0]} frames but {len(self.timebase)} times",
                 "one time per frame",
             )
         if self.vertex_counts is not None:
             counts = np.ascontiguousarray(self.vertex_counts, np.int64)
             if counts.shape != (shape[1],) or counts.min() < 1:
                 raise Sd2Error(
-                    f"{self.source or 'The mesh'}: vertex_counts of shape {counts.shape},"
+                    f"{name}: vertex_counts of shape {counts.shape},"
                     f" the least of them {counts.min(initial=1)}",
                     f"{shape[1]} numbers from 1",
                 )
@@ -131,8 +127,7 @@ class MeshSequence:
             given = known.frame_count, len(known.vertex_limb)
             if given != shape[:2]:
                 raise Sd2Error(
-                    f"{self.source or 'The mesh'}: its uncertainty is of {given[0]} frames and"
-                    f" {given[1]} vertices",
+                    f"{name}: its uncertainty is of {given[0]} frames and {given[1]} vertices",
                     f"those of the mesh, {shape[0]} and {shape[1]}",
                 )
         if self.faces is not None and not np.size(self.faces):
@@ -145,22 +140,8 @@ class MeshSequence:
                     "surfaces in frames at the same times",
                     "Put them together with sd2core.io.bodies.with_bodies",
                 )
-        if self.faces is None:
-            return
-        faces = np.ascontiguousarray(self.faces, dtype=np.int32)
-        if faces.ndim != 2 or faces.shape[1] != 3:
-            raise Sd2Error(
-                f"{self.source or 'The mesh'}: faces have shape {faces.shape}",
-                "(faces, 3): three vertex numbers per triangle",
-            )
-        if faces.size and not (faces.min() >= 0 and faces.max() < shape[1]):
-            bad = faces.max() if faces.max() >= shape[1] else faces.min()
-            raise Sd2Error(
-                f"{self.source or 'The mesh'}: a face names vertex {bad}",
-                f"vertex numbers from 0 to {shape[1] - 1}",
-                "Give the faces that belong to this mesh (--faces)",
-            )
-        object.__setattr__(self, "faces", faces)
+        if self.faces is not None:
+            object.__setattr__(self, "faces", checked_faces(self.faces, shape[1], name))
 
     def __repr__(self) -> str:
         faces = "no triangles" if self.faces is None else f"{len(self.faces):,} triangles"
@@ -251,6 +232,38 @@ class MeshSequence:
             return None
         frame = self.timebase.frame_at(time_s)
         return frame if self.presence.present[frame] else None
+
+
+def check_shape(shape: tuple[int, ...], name: str) -> None:
+    """Raise Sd2Error unless this is the shape of the vertices of a mesh."""
+    if len(shape) != 3 or shape[2] != 3 or 0 in shape:
+        raise Sd2Error(
+            f"{name}: the vertices have shape {shape}",
+            "(frames, vertices, 3), none of them zero",
+            "Transpose or cut the array where the file is written",
+        )
+
+
+def checked_faces(faces: ArrayLike, vertices: int, name: str) -> NDArray[np.int32]:
+    """Faces (F, 3) of a mesh with so many vertices; Sd2Error if they are none, or of another."""
+    numbers = np.asarray(faces)
+    if numbers.ndim != 2 or numbers.shape[1] != 3 or numbers.dtype.kind not in "iuf":
+        raise Sd2Error(
+            f"{name}: the faces have shape {numbers.shape} and type {numbers.dtype}",
+            "(faces, 3): three vertex numbers per triangle",
+            "Triangulate the surface where the file is written",
+        )
+    if numbers.dtype.kind == "f" and not (numbers == np.floor(numbers)).all():
+        raise Sd2Error(f"{name}: face numbers are not whole", "vertex numbers such as 0, 1, 2")
+    least, most = numbers.min(initial=0), numbers.max(initial=0)
+    if least < 0 or most >= vertices:
+        raise Sd2Error(
+            f"{name}: a face names vertex {least if least < 0 else most:.0f},"
+            f" the mesh has {vertices:,} vertices",
+            f"vertex numbers from 0 to {vertices - 1}",
+            "Give the faces that belong to this mesh (--faces)",
+        )
+    return np.ascontiguousarray(numbers, np.int32)
 
 
 def refuse_missing(vertices: NDArray[Any], first_frame: int, source: str) -> None:
