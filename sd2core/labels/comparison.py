@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sd2core.labels.spans import Labels, Span
+from sd2core.labels.spans import Labels
 
 
 @dataclass(frozen=True)
@@ -49,15 +48,3 @@ def changed_stretch(before: Labels, after: Labels) -> tuple[float, float] | None
     if not differ:
         return None
     return min(span.start_s for span in differ), max(span.end_s for span in differ)
-
-
-def same_ends(one: Sequence[Span], other: Sequence[Span]) -> tuple[int, int]:
-    """Count the identical spans at the start of both sequences, and those at the end.
-
-    Identical means the same object, as edits leave the spans that they do not touch.
-    """
-    shorter = min(len(one), len(other))
-    first = next((k for k in range(shorter) if one[k] is not other[k]), shorter)
-    rest = shorter - first
-    stop = next((k for k in range(rest) if one[-1 - k] is not other[-1 - k]), rest)
-    return first, stop
