@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.output import (
+    Report,
     counted,
     duration,
     print_event,
@@ -69,7 +71,7 @@ class Batch(JsonAndProgress):
 
 
 @command("batch", Batch)
-def _batch(options: Batch) -> int:
+def _batch(options: Batch) -> int | Report:
     """Fit, synthesise, denoise and export many recordings from many places.
 
     Runs a plan (TOML, see docs/formats.md) on all cores of this machine, or on the
@@ -87,7 +89,7 @@ def _batch(options: Batch) -> int:
     from sd2core.batch.folder import BatchFolder
 
     if options.status is not None:
-        return _show_status(options.status, options.json)
+        return _status(options.status)
     if options.stop is not None:
         BatchFolder(options.stop).tell("stop")
         print(f"Stopping {options.stop}")
@@ -191,17 +193,15 @@ def _count_facts(facts: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def _show_status(path: Path, as_json: bool) -> int:
+def _status(path: Path) -> Report:
     from dataclasses import asdict
 
     from sd2core.batch.folder import BatchFolder
 
     status = BatchFolder(path).status()
-    if as_json:
-        print_json({"out": str(path), **asdict(status)})
-    else:
-        print_facts(f"{path}: {status.state}", _count_facts(asdict(status)) | _times(status))
-    return 0
+    data = asdict(status)
+    facts = _count_facts(data) | _times(status)
+    return Report(f"{path}: {status.state}", {"out": str(path), **data}, facts)
 
 
 def _times(status: BatchStatus) -> dict[str, str]:
@@ -214,18 +214,14 @@ def _times(status: BatchStatus) -> dict[str, str]:
     }
 
 
-def _dry_run(plan: BatchPlan, options: Batch) -> int:
+def _dry_run(plan: BatchPlan, options: Batch) -> Report:
     from sd2core.batch.estimate import estimate
     from sd2core.numerics.compiled import worker_count
 
     workers = options.workers or worker_count()
     with progress_bar("Looking", "recording") as progress:
         made = estimate(plan, workers, progress)
-    if options.json:
-        print_json(made.to_json())
-    else:
-        print_estimate(made, plan)
-    return 0
+    return Report("", made.to_json(), say=partial(print_estimate, made, plan))
 
 
 def print_estimate(made: BatchEstimate, plan: BatchPlan) -> None:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:  # records take as long to load as all that `sd2 --help` needs
+    from sd2core.cli.output import Report
     from sd2core.options.records import Group, Option, OptionRecord
 
 Record = TypeVar("Record", bound="OptionRecord")
-Handler = TypeVar("Handler", bound=Callable[[Any], int | None])
+Handler = TypeVar("Handler", bound="Callable[[Any], int | Report | None]")
 
 HELP = ("-h", "--help")
 
@@ -265,7 +266,7 @@ def add_command(
     name: str,
     *,
     options: type[Record] | None = None,
-    handler: Callable[[Any], int | None] | None = None,
+    handler: Callable[[Any], int | Report | None] | None = None,
     about: Callable[..., Any] | None = None,
     description: str = "",
 ) -> CommandParser:
@@ -283,7 +284,8 @@ def add_command(
     options : type of OptionRecord, optional
         Fields become options.
     handler : callable, optional
-        Called with the record, or what was typed without one; returns the exit code, None for 0.
+        Called with the record, or what was typed without one; returns the exit code, None for 0, or
+        a report that is printed.
     about : callable, optional
         Its docstring is the help in place of the handler's.
     description : str

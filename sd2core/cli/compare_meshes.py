@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import counted, print_json, print_rows, progress_bar
+from sd2core.cli.output import Report, counted, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Words
 from sd2core.options.records import ARGUMENTS, OptionError
@@ -78,7 +79,7 @@ class CompareMeshes(Sensor, MeshReading, Figure, Json):
 
 
 @command("compare-meshes", CompareMeshes)
-def _compare(options: CompareMeshes) -> None:
+def _compare(options: CompareMeshes) -> Report:
     """Compare meshes of one video: joints, velocities along the line of sight, Doppler maps.
 
     Every mesh is measured against the first (or --reference): mean distance of the
@@ -111,10 +112,7 @@ def _compare(options: CompareMeshes) -> None:
         )
     if options.figure is not None:
         save_figure(draw_comparison(comparison), options.figure)
-    if options.json:
-        print_json(comparison.as_dict())
-        return
-    _print(comparison)
+    return Report("", comparison.as_dict(), say=partial(_print, comparison))
 
 
 def _print(comparison: Comparison) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import progress_bar
+from sd2core.cli.output import Report, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENT
 from sd2core.options.shared import Denoising, Json, MapOutput
@@ -25,7 +25,7 @@ class Denoise(MapOutput, Denoising, Json):
 
 
 @command("denoise", Denoise)
-def _denoise(options: Denoise) -> None:
+def _denoise(options: Denoise) -> Report:
     """Turn a synthetic Doppler map into what a radar would show.
 
     A trained model estimates what a radar would have measured, from the map that
@@ -37,7 +37,7 @@ def _denoise(options: Denoise) -> None:
       sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors
       sd2 denoise map.npz --out as-the-radar-shows-it.npz --texture
     """
-    from sd2core.cli.info.description import describe_map, show
+    from sd2core.cli.info.description import describe_map
     from sd2core.cli.info.model import model_words
     from sd2core.denoise.files import default_name, describe_model, find_model, load_model
     from sd2core.denoise.resample_to_model import check_map
@@ -68,4 +68,4 @@ def _denoise(options: Denoise) -> None:
     denoised.save(options.out)
     description = describe_map(options.out, denoised)
     description.facts = {"model": model_words(card)} | description.facts
-    show(description, as_json=options.json)
+    return description

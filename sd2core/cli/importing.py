@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import Report, print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG, RANGE_M
 from sd2core.options.kinds import DemoScene, Names, Vector
@@ -196,7 +196,7 @@ def copy_sample(out: Path, scene: DemoScene = "one") -> None:
 
 
 @command("import", Import)
-def _import(options: Import) -> None:
+def _import(options: Import) -> Report:
     """Make a recording from a video, a mesh and a radar capture.
 
     A recording is a folder NAME.sd2 that says what belongs together. The files stay
@@ -210,7 +210,7 @@ def _import(options: Import) -> None:
       sd2 import --radar capture/ --receiver 2 --out lab.sd2
       sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2
     """
-    from sd2core.cli.info.description import describe_parts, describe_recording, show
+    from sd2core.cli.info.description import describe_parts, describe_recording
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
@@ -234,7 +234,7 @@ def _import(options: Import) -> None:
         made.pop_all()
     if options.copy:
         parts = describe_parts(recording)
-    show(describe_recording(recording, parts), as_json=options.json)
+    return describe_recording(recording, parts)
 
 
 def _new_folder_for_vertices(out: Path, made: ExitStack) -> Path:
@@ -295,7 +295,7 @@ def _refuse_unused_channel(recording: Recording, options: Content) -> None:
 
 
 @command("set", Set)
-def _set(options: Set) -> None:
+def _set(options: Set) -> Report:
     """Change what a recording is made of: its files, its clocks, where its radar is.
 
     What is not named stays. Pairs, alignment, exports and the window use what is set.
@@ -311,7 +311,7 @@ def _set(options: Set) -> None:
       sd2 set walk.sd2 --body anna=anna.npz@0.8,0,0.5,90 --body bert.sd2
       sd2 set walk.sd2 --wall floor@1.1 --wall right@2,6
     """
-    from sd2core.cli.info.description import describe_parts, describe_recording, show
+    from sd2core.cli.info.description import describe_parts, describe_recording
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.files.paths import plain_path
     from sd2core.files.resources import is_bundled
@@ -370,7 +370,7 @@ def _set(options: Set) -> None:
             print("note: that was done before, or there is no video", file=sys.stderr)
         recording = open_recording(recording.folder)
         parts = describe_parts(recording)
-    show(describe_recording(recording, parts), as_json=options.json)
+    return describe_recording(recording, parts)
 
 
 def _thing(text: str) -> Thing:

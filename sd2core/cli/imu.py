@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.cli.output import Report, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.inertial import SensorErrors
 from sd2core.options.kinds import Positive, Vector
@@ -38,7 +38,7 @@ class Imu(MeshInput, Overwrite, SensorErrors, Json):
 
 
 @command("imu", Imu)
-def _imu(options: Imu) -> None:
+def _imu(options: Imu) -> Report:
     """What an inertial sensor on the body would measure (simulated).
 
     Fixes an accelerometer and a gyroscope to the body and writes what they would feel:
@@ -73,13 +73,11 @@ def _imu(options: Imu) -> None:
         )
     write_signals(options.out, signals)
     summary = signals_data(signals)
-    if options.json:
-        print_json({"file": str(options.out), **summary, **signals.meta})
-        return
     unknown = summary["samples"] - summary["known_samples"]
     who = [name for name in ("at", "person") if name in signals.meta]
-    print_facts(
+    return Report(
         f"{options.out} (simulated)",
+        {"file": str(options.out), **summary, **signals.meta},
         {
             "at": " of ".join(str(signals.meta[name]) for name in who),
             "axes": str(signals.meta["axes"]),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Any
 
 from sd2core.files.tables import counted as counted
@@ -80,6 +81,36 @@ def progress_events(every_s: float, *, time_left: bool = False, **content: Any) 
             print_event("progress", done=done, total=total, **content, **left)
 
     return report
+
+
+@dataclass
+class Report:
+    """What a command found: data for programs, and a title, facts and notes for people.
+
+    ``say`` prints other words instead of these; ``code`` is the exit code.
+    """
+
+    title: str
+    data: dict[str, Any]
+    facts: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    parts: Sequence[Report] = ()
+    say: Callable[[], object] | None = None
+    code: int = 0
+
+    def print(self, *, as_json: bool) -> None:
+        """Print it for programs or for people, its parts below it."""
+        if as_json:
+            print_json(self.data)
+        elif self.say is not None:
+            self.say()
+        else:
+            print_facts(self.title, self.facts)
+            for note in self.notes:
+                print(f"  note: {note}")
+            for part in self.parts:
+                print()
+                part.print(as_json=False)
 
 
 def print_facts(title: str, facts: Mapping[str, str]) -> None:

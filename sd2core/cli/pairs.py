@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from sd2core.cli.command_parser import Subcommands, add_command, command_group
-from sd2core.cli.output import counted, print_facts, print_json, progress_bar
+from sd2core.cli.output import Report, counted, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import SEED
 from sd2core.options.kinds import Bins, Vector, Words
@@ -151,7 +151,7 @@ def _commands(kinds: Subcommands) -> None:
     add_command(kinds, "vary", options=Vary, handler=_vary)
 
 
-def _label(options: Label) -> None:
+def _label(options: Label) -> Report:
     """Put labels on pairs, in place of those that are there.
 
     A row without times labels a whole take; later rows lie over earlier ones, and frames
@@ -187,12 +187,9 @@ def _label(options: Label) -> None:
     if not rows:
         raise Sd2Error("There are no labels to put on pairs", "--table, or --take with a file")
     counts = label_pairs(options.pairs, rows)
-    if options.json:
-        print_json({"pairs": str(options.pairs), "frames_of_label": counts})
-        return
-    print_facts(
-        str(options.pairs), {name: counted(count, "frame") for name, count in counts.items()}
-    )
+    data = {"pairs": str(options.pairs), "frames_of_label": counts}
+    frames = {name: counted(count, "frame") for name, count in counts.items()}
+    return Report(str(options.pairs), data, frames)
 
 
 def _choices(options: Mars) -> MarsChoices:
@@ -215,7 +212,7 @@ def _mars_synthesis(options: MadePairs) -> SynthesisOptions:
     return replace(synthesis, axis=axis, **given(options, ("null_bins", "visibility", "weight")))
 
 
-def _recordings(options: Recordings) -> None:
+def _recordings(options: Recordings) -> Report:
     """Pairs from recordings that have a mesh and a radar capture.
 
     The synthetic Doppler of each recording's mesh is the input, the Doppler of its
@@ -237,14 +234,15 @@ def _recordings(options: Recordings) -> None:
             limbs=options.limbs,
             progress=progress,
         )
-    if options.json:
-        subjects = {
+    data = {
+        "pairs": str(options.out),
+        "subjects": {
             name: {"takes": takes, "frames": frames}
             for name, (takes, frames) in made.subjects.items()
-        }
-        lost = {"left_out_s": made.left_out_s, "damaged_frames": made.damaged}
-        print_json({"pairs": str(options.out), "subjects": subjects} | lost)
-        return
+        },
+        "left_out_s": made.left_out_s,
+        "damaged_frames": made.damaged,
+    }
     facts = {
         name: f"{counted(takes, 'take')}, {counted(frames, 'frame')}"
         for name, (takes, frames) in made.subjects.items()
@@ -255,7 +253,7 @@ def _recordings(options: Recordings) -> None:
         facts["damaged"] = ", ".join(
             f"{counted(count, 'frame')} of {name}, left out" for name, count in made.damaged.items()
         )
-    print_facts(str(options.out), facts)
+    return Report(str(options.out), data, facts)
 
 
 def _synthesis(options: MadePairs) -> SynthesisOptions:
@@ -271,7 +269,7 @@ def _synthesis(options: MadePairs) -> SynthesisOptions:
     return replace(synthesis, **given(options, ("null_bins",)))
 
 
-def _vary(options: Vary) -> None:
+def _vary(options: Vary) -> Report:
     """Simulated pairs of the same movements as they were not recorded.
 
     A body moves as in a recording, or as MARS' Kinect saw it, but is seen from another
@@ -306,16 +304,12 @@ def _vary(options: Vary) -> None:
         else:
             pairs = vary_mars(options.sources, options.out, chosen, progress)
     counts = {name: len(pairs.of([name]).takes) for name in pairs.subjects}
-    if options.json:
-        print_json({"pairs": str(options.out), "simulated": True, "takes_of_subject": counts})
-        return
-    facts = {"radar": "simulated"} | {
-        name: counted(takes, "take") for name, takes in counts.items()
-    }
-    print_facts(str(options.out), facts)
+    data = {"pairs": str(options.out), "simulated": True, "takes_of_subject": counts}
+    facts = {name: counted(takes, "take") for name, takes in counts.items()}
+    return Report(str(options.out), data, {"radar": "simulated"} | facts)
 
 
-def _mars(options: Mars) -> None:
+def _mars(options: Mars) -> Report:
     """Pairs from MARS recordings: a Kinect skeleton and a radar's points.
 
     A body of the person's size moves as the Kinect saw it; its synthetic Doppler is
@@ -332,15 +326,7 @@ def _mars(options: Mars) -> None:
 
     with progress_bar("Making pairs") as progress:
         made = make_mars_pairs(options.folders, options.out, _choices(options), progress)
-    if options.json:
-        print_json(
-            {
-                "pairs": str(options.out),
-                "kind": "real",
-                "subjects": {subject: asdict(one) for subject, one in made.items()},
-            }
-        )
-        return
+    subjects = {subject: asdict(one) for subject, one in made.items()}
     facts = {"radar": "real"}
     for subject, one in made.items():
         line = f"{counted(one.takes, 'take')}, {counted(one.frames, 'frame')}"
@@ -350,7 +336,8 @@ def _mars(options: Mars) -> None:
                 f" {100 * one.residual_m:.1f} cm from the skeleton's; {_place_words(one.radar)}"
             )
         facts[subject] = line
-    print_facts(str(options.out), facts)
+    data = {"pairs": str(options.out), "kind": "real", "subjects": subjects}
+    return Report(str(options.out), data, facts)
 
 
 def _place_words(place: RadarPlace) -> str:

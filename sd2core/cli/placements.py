@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.ladder import UsualRequest
 from sd2core.cli.output import (
+    Report,
     counted,
     duration,
     picked,
     print_facts,
-    print_json,
     print_rows,
     progress_bar,
 )
@@ -80,7 +81,7 @@ class Placing(MeshInput, UsualRequest, Overwrite, Json):
 
 
 @command("placements", Placing)
-def _placements(options: Placing) -> None:
+def _placements(options: Placing) -> Report:
     """Plan sensors around a body, and say what a map from each would cost.
 
     A grid of every range, azimuth and elevation that is given, or with --cloud as many
@@ -117,19 +118,15 @@ def _placements(options: Placing) -> None:
         write_placements(options.out, placements)
     radar = _radar(recording)
     listed = _listed(placements, sensors, coverage, radar)
-    if options.json:
-        print_json(
-            {
-                "placements": placements.as_dict(),
-                "target_m": body.target_m,
-                "radar": picked(radar, "name", "range_max_m", "v_max_mps"),
-                "places": listed,
-                "cost": picked(cost, "maps", "frames", "frame_ms", "total_s", "total_bytes"),
-                "choice": choice.to_json(),
-            }
-        )
-    else:
-        _print(options.mesh, listed, radar, cost, choice)
+    data = {
+        "placements": placements.as_dict(),
+        "target_m": body.target_m,
+        "radar": picked(radar, "name", "range_max_m", "v_max_mps"),
+        "places": listed,
+        "cost": picked(cost, "maps", "frames", "frame_ms", "total_s", "total_bytes"),
+        "choice": choice.to_json(),
+    }
+    return Report("", data, say=partial(_print, options.mesh, listed, radar, cost, choice))
 
 
 def _spec(options: Placing, recording: Recording | None) -> Placements:

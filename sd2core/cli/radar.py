@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import progress_bar
+from sd2core.cli.output import Report, progress_bar
 from sd2core.cli.radar_description import DESCRIPTION, Description, describe
 from sd2core.options.kinds import SpanM
 from sd2core.options.records import ARGUMENT, OptionError, Place, changed_flags, given_flags
@@ -73,7 +73,7 @@ class Radar(ReplacesMaps, Axis, Channel, Json, Description):
 
 
 @command("radar", Radar)
-def _radar(options: Radar) -> None:
+def _radar(options: Radar) -> Report:
     """Turn a raw radar capture into a Doppler map, or say what limits it has.
 
     Prints the resolution and limits of the radar by its configuration, what was
@@ -92,11 +92,8 @@ def _radar(options: Radar) -> None:
       sd2 radar points.csv --out real.npz --v-max 4    (a point cloud)
     """
     if options.file is not None:
-        describe(options.file, options, as_json=options.json)
-    elif options.out is None:
-        _show_limits(options)
-    else:
-        _write_map(options, options.out)
+        return describe(options.file, options)
+    return _limits(options) if options.out is None else _write_map(options, options.out)
 
 
 def _found(options: Radar) -> tuple[Path, RadarCapture | None, float]:
@@ -112,21 +109,19 @@ def _found(options: Radar) -> tuple[Path, RadarCapture | None, float]:
     return recording.radar or path, capture, recording.radar_offset_s
 
 
-def _show_limits(options: Radar) -> None:
+def _limits(options: Radar) -> Report:
     """Say what a capture's radar can tell apart, and what was assumed of it."""
-    from sd2core.cli.info.description import describe_capture, describe_radar, show
+    from sd2core.cli.info.description import describe_capture, describe_radar
 
     path, capture, _ = _found(options)
     if capture is None:
         options.refuse(_CHANNEL, f"and {path} holds a finished map", "for raw samples only")
-        description = describe_radar(path)
-    else:
-        description = describe_capture(path, capture)
-    show(description, as_json=options.json)
+        return describe_radar(path)
+    return describe_capture(path, capture)
 
 
-def _write_map(options: Radar, out: Path) -> None:
-    from sd2core.cli.info.description import describe_map, limit_facts, show
+def _write_map(options: Radar, out: Path) -> Report:
+    from sd2core.cli.info.description import describe_map, limit_facts
     from sd2core.cli.reading import chosen_axis
     from sd2core.fmcw import doppler_map, limits
 
@@ -149,7 +144,7 @@ def _write_map(options: Radar, out: Path) -> None:
         description.data["limits"] = limits(capture.config)
         radar = {"radar": capture.config.name, **limit_facts(capture.config)}
         description.facts = radar | description.facts
-    show(description, as_json=options.json)
+    return description
 
 
 def _recorded(path: Path, options: Radar) -> DopplerMap:

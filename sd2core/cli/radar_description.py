@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from sd2core.cli.output import Report
 from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Count, Positive, Words
 from sd2core.options.records import Group, OptionRecord, given, options_of
@@ -82,9 +83,9 @@ class Description(OptionRecord):
 DESCRIPTION = {one.name: one for one in options_of(Description)}
 
 
-def describe(path: Path, options: Description, *, as_json: bool) -> None:
+def describe(path: Path, options: Description) -> Report:
     """Write a description, once the capture opens with it, and describe the capture."""
-    from sd2core.cli.info.description import describe_capture, show
+    from sd2core.cli.info.description import describe_capture
     from sd2core.files.texts import faults_in
     from sd2core.io.radar.described import (
         RadarDescription,
@@ -102,8 +103,7 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
     entries = given(options, DESCRIPTION)
     of_points = looks_like_points(path) and not entries.keys() & {"axes", "carrier_hz"}
     if "columns" in entries or of_points or path.suffix.lower() in TEXT_SUFFIXES:
-        _describe_points(path, entries, as_json=as_json)
-        return
+        return _describe_points(path, entries)
 
     if not is_describable(path):
         raise Sd2Error(
@@ -119,8 +119,7 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         print(f"columns ({prompt}): ", end="", file=sys.stderr, flush=True)
         if answer := sys.stdin.readline().strip():
             entries["columns"] = tuple(one.strip() for one in answer.split(","))
-            _describe_points(path, entries, as_json=as_json)
-            return
+            return _describe_points(path, entries)
     entries = _entries_of_sigmf(path) | entries
     if len(names := array_names(path)) > 1:
         _ask_for("dataset", entries, f" ({', '.join(names[:9])})")
@@ -139,13 +138,12 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
     capture = capture_of(path, description)
     written = write_description(description, path)
     shown = describe_capture(path, capture)
-    shown.facts["description"] = str(written)
-    shown.data["description"] = str(written)
-    show(shown, as_json=as_json)
+    shown.facts["description"] = shown.data["description"] = str(written)
+    return shown
 
 
-def _describe_points(path: Path, entries: dict[str, Any], *, as_json: bool) -> None:
-    from sd2core.cli.info.description import describe_radar, show
+def _describe_points(path: Path, entries: dict[str, Any]) -> Report:
+    from sd2core.cli.info.description import describe_radar
     from sd2core.io.radar.described import write_description
     from sd2core.io.radar.points import (
         column_names,
@@ -174,7 +172,7 @@ def _describe_points(path: Path, entries: dict[str, Any], *, as_json: bool) -> N
     written = write_description(description, path)
     shown = describe_radar(path)
     shown.facts["description"] = shown.data["description"] = str(written)
-    show(shown, as_json=as_json)
+    return shown
 
 
 def _entries_of_sigmf(path: Path) -> dict[str, Any]:

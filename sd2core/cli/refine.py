@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.cli.output import Report, progress_bar
 from sd2core.options.shared import Json, MeshInput, Overwrite
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Refine(MeshInput, Overwrite, Json):
 
 
 @command("refine", Refine)
-def _refine(options: Refine) -> None:
+def _refine(options: Refine) -> Report:
     """Make a mesh of another tool smooth in time, and say how well its velocities are known.
 
     Estimators of bodies look at one frame after the other, and jitter between frames is
@@ -57,18 +57,14 @@ def _refine(options: Refine) -> None:
         "along_mps": float(np.median(smooth.uncertainty.along_mps[present])),
         "across_mps": float(np.median(smooth.uncertainty.across_mps[present])),
     }
-    if options.json:
-        made = {"out": str(options.out), "frames": smooth.frame_count, "velocity_sigma": known}
-        print_json(made | {"notes": list(smooth.notes)})
-        return
+    made = {"out": str(options.out), "frames": smooth.frame_count, "velocity_sigma": known}
     facts = {
         "frames": f"{smooth.frame_count:,}",
         "velocities": f"±{known['along_mps']:.2f} m/s along the line of sight,"
         f" ±{known['across_mps']:.2f} across it (median)",
     }
-    print_facts(f"Wrote {options.out}", facts)
-    for note in smooth.notes:
-        print(f"note: {note}")
+    data = made | {"notes": list(smooth.notes)}
+    return Report(f"Wrote {options.out}", data, facts, smooth.notes)
 
 
 def _read(options: Refine) -> MeshSequence:

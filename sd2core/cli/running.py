@@ -10,14 +10,14 @@ import sys
 from collections.abc import Sequence
 
 from sd2core.cli.command_parser import UsageError, record_of
-from sd2core.cli.output import discard_output
+from sd2core.cli.output import Report, discard_output
 from sd2core.errors import Sd2Error, of_the_system
 
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
 def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
-    """Parse, call the handler and turn errors into a sentence on standard error.
+    """Parse, call the handler, print what it reports, and turn errors into a sentence.
 
     With ``--json`` or ``--progress-json`` standard output has the error as well. Returns 0, or the
     handler's code; 1 for an error; 2 where the words are no command; 130 when interrupted.
@@ -29,9 +29,12 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         from sd2core.cli.output_folders import output_folders
 
         with output_folders(options):
-            code = options.handler(record_of(options))
+            found = options.handler(record_of(options))
+            if isinstance(found, Report):
+                found.print(as_json=options.json)
+                found = found.code
         _flush_output()
-        return code or 0
+        return found or 0
     except KeyboardInterrupt:
         from sd2core.processes import INTERRUPTED
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from sd2core.cli.command_parser import Subcommands, add_command, command_group
-from sd2core.cli.output import counted, picked, print_json, progress_bar
+from sd2core.cli.output import Report, counted, picked, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import ANY, COUNT
 from sd2core.options.kinds import Count, Positive, Typed, joined, number_reader, vector
@@ -239,7 +239,7 @@ def simulate_with_bar(
         )
 
 
-def _radar(options: SimulateRadar) -> None:
+def _radar(options: SimulateRadar) -> Report:
     """Compute the raw samples that a radar would record of a moving mesh.
 
     Sums the echo of every triangle, with its phase, to the beat signal of an FMCW
@@ -253,7 +253,7 @@ def _radar(options: SimulateRadar) -> None:
       sd2 simulate radar walk.npz --out floor --ground 1.1 --beam-width-deg 60
       sd2 simulate radar walk.npz --out like-mine --radar capture/config.json
     """
-    from sd2core.cli.info.description import describe_capture, show
+    from sd2core.cli.info.description import describe_capture
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
     from sd2core.io.radar import named_radar
@@ -304,7 +304,7 @@ def _radar(options: SimulateRadar) -> None:
     description = describe_capture(folder, capture)
     description.notes = mesh.notes + notes_on(mesh, sensor, config) + description.notes
     description.data["notes"] = list(description.notes)
-    show(description, as_json=options.json)
+    return description
 
 
 def _protocol(options: SimulateCampaign) -> Protocol:
@@ -316,7 +316,7 @@ def _protocol(options: SimulateCampaign) -> Protocol:
     return replace(VARIED, movements=options.movements, drawn_radars=drawn)
 
 
-def _campaign(options: SimulateCampaign) -> None:
+def _campaign(options: SimulateCampaign) -> Report:
     """Make pairs of synthetic Doppler and simulated radar to train a denoiser on.
 
     People of random shape swipe to the right, left, down and up, or move as real people
@@ -374,25 +374,21 @@ def _campaign(options: SimulateCampaign) -> None:
     pairs = read_pairs(options.out)
     first = pairs.placements(first_only=True)
     minutes = first.frames / first.frame_rate_hz / 60.0
-    if options.json:
-        print_json(
-            {
-                "path": str(options.out),
-                "simulated": True,
-                "protocol": campaign.protocol.name,
-                "subjects": list(pairs.subjects),
-                "takes": len(pairs.takes),
-                "made": made,
-                "frames": pairs.frames,
-                "minutes": minutes,
-                "placements": options.sensors,
-                "labels": list(pairs.labels),
-            }
-        )
-        return
-    print(
+    return Report(
         f"Made {counted(made, 'take')}: {options.out} holds"
         f" {counted(len(first.takes), 'simulated take')} of"
         f" {counted(len(pairs.subjects), 'person', 'people')}, {minutes:.1f} minutes"
-        + (f", each from {options.sensors} places" if options.sensors > 1 else "")
+        + (f", each from {options.sensors} places" if options.sensors > 1 else ""),
+        {
+            "path": str(options.out),
+            "simulated": True,
+            "protocol": campaign.protocol.name,
+            "subjects": list(pairs.subjects),
+            "takes": len(pairs.takes),
+            "made": made,
+            "frames": pairs.frames,
+            "minutes": minutes,
+            "placements": options.sensors,
+            "labels": list(pairs.labels),
+        },
     )

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import progress_bar
+from sd2core.cli.output import Report, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionError, changed_flags, options_of
 from sd2core.options.shared import Json, MapOutput, MeshAndSensor, Method, RadarChoice
@@ -57,7 +57,7 @@ class Synth(MeshAndSensor, MapOutput, Method, RadarChoice, Request, Synthesis, J
 
 
 @command("synth", Synth)
-def _synth(options: Synth) -> None:
+def _synth(options: Synth) -> Report:
     """Compute the Doppler that a radar would have measured of a moving mesh.
 
     Counts the mesh's vertices by their velocity towards the sensor, frame by frame.
@@ -76,7 +76,7 @@ def _synth(options: Synth) -> None:
       sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)
       sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)
     """
-    from sd2core.cli.info.description import describe_map, show
+    from sd2core.cli.info.description import describe_map
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.doppler import Synthesizer
     from sd2core.doppler.options import chosen_options
@@ -108,7 +108,7 @@ def _synth(options: Synth) -> None:
     notes = (*mesh.notes, *notes_on(mesh, sensor, radar), *description.notes)
     description.notes = tuple(dict.fromkeys(notes))  # a gap is found in the mesh and in the map
     description.data["notes"] = list(description.notes)
-    show(description, as_json=options.json)
+    return description
 
 
 def _as_chosen(

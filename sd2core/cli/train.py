@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import counted, picked, print_facts, print_json, tell_lost
+from sd2core.cli.output import Report, counted, picked, tell_lost
 from sd2core.errors import Sd2Error
 from sd2core.options.training import DataConfig, Train, TrainConfig
 
@@ -21,7 +21,7 @@ _BACKGROUND_NICE = 10
 
 
 @command("train", Train)
-def _train(options: Train) -> int:
+def _train(options: Train) -> int | Report:
     """Train a denoiser that turns synthetic Doppler into what a radar would show.
 
     Learns from pairs of synthetic and radar Doppler of the same movement, as
@@ -52,7 +52,7 @@ def _train(options: Train) -> int:
     if options.resume is not None:
         with _bar(f"Training {options.resume.name}") as watch:
             ending = go_on(options.resume, watch=watch)
-        return _say_ending(options, options.resume, ending)
+        return _report(options.resume, ending)
     config = _config(options)
     if options.show_settings:
         config = with_start(config)
@@ -64,7 +64,7 @@ def _train(options: Train) -> int:
     command = shlex.join(["sd2", *sys.argv[1:]])
     with _bar(f"Training {options.out.name}") as watch:
         ending = begin(config, options.out, command=command, watch=watch)
-    return _say_ending(options, options.out, ending)
+    return _report(options.out, ending)
 
 
 def _config(options: Train) -> TrainConfig:
@@ -137,37 +137,33 @@ def _bar(what: str) -> Iterator[Watch]:
         yield watch
 
 
-def _say_ending(options: Train, run: Path, ending: Ending) -> int:
+def _report(run: Path, ending: Ending) -> Report:
     from sd2core.processes import INTERRUPTED
 
-    if options.json:
-        print_json(
-            {
-                "run": str(run),
-                **picked(ending, "outcome", "best_epoch", "validation_rmse", "validation_mae_mps"),
-                "model": None if ending.model is None else str(ending.model),
-            }
-        )
-    else:
-        facts = {}
-        if ending.best_epoch is not None:
-            facts["best epoch"] = str(ending.best_epoch)
-            facts["validation"] = f"RMSE {ending.validation_rmse:.4f}"
-            if ending.validation_mae_mps is not None:
-                facts["validation"] += (
-                    f", peak velocity off by {ending.validation_mae_mps:.3f} m/s on average"
-                )
-        if ending.model is not None:
-            facts["model"] = str(ending.model)
-        if ending.early_after is not None:
-            facts["ended early"] = (
-                f"none of the last {counted(ending.early_after, 'epoch')} was better"
-                " (--early-stopping 0 trains on)"
+    data = {
+        "run": str(run),
+        **picked(ending, "outcome", "best_epoch", "validation_rmse", "validation_mae_mps"),
+        "model": None if ending.model is None else str(ending.model),
+    }
+    facts = {}
+    if ending.best_epoch is not None:
+        facts["best epoch"] = str(ending.best_epoch)
+        facts["validation"] = f"RMSE {ending.validation_rmse:.4f}"
+        if ending.validation_mae_mps is not None:
+            facts["validation"] += (
+                f", peak velocity off by {ending.validation_mae_mps:.3f} m/s on average"
             )
-        if ending.outcome == "stopped":
-            facts["go on"] = f"sd2 train --resume {run}"
-        print_facts(f"{run} has {_WORDS[ending.outcome]}", facts)
-    return INTERRUPTED if ending.interrupted else 0
+    if ending.model is not None:
+        facts["model"] = str(ending.model)
+    if ending.early_after is not None:
+        facts["ended early"] = (
+            f"none of the last {counted(ending.early_after, 'epoch')} was better"
+            " (--early-stopping 0 trains on)"
+        )
+    if ending.outcome == "stopped":
+        facts["go on"] = f"sd2 train --resume {run}"
+    code = INTERRUPTED if ending.interrupted else 0
+    return Report(f"{run} has {_WORDS[ending.outcome]}", data, facts, code=code)
 
 
 _WORDS = {"finished": "finished", "stopped": "been stopped", "cancelled": "been discarded"}

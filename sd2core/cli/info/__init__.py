@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.info.description import (
-    Description,
     describe_imu,
     describe_map,
     describe_mesh,
@@ -17,9 +16,8 @@ from sd2core.cli.info.description import (
     describe_radar,
     describe_recording,
     describe_video,
-    show,
 )
-from sd2core.cli.output import progress_bar
+from sd2core.cli.output import Report, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENT
 from sd2core.options.shared import Json, MeshReading
@@ -44,7 +42,7 @@ class Info(MeshReading, Json):
 
 
 @command("info", Info)
-def _info(options: Info) -> None:
+def _info(options: Info) -> Report:
     """What is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model.
 
     sd2 info walk.sd2
@@ -53,15 +51,14 @@ def _info(options: Info) -> None:
     """
     path = _installed(options.path)
     if not options.verify:
-        show(describe(path, options), as_json=options.json)
-        return
+        return describe(path, options)
     from sd2core.io.kinds import kind_of
 
     verified = verify(path, kind_of(path))
     description = describe(path, options)
     description.data["verified"] = verified
     description.facts["verified"] = in_words(verified)
-    show(description, as_json=options.json)
+    return description
 
 
 def _installed(path: Path) -> Path:
@@ -76,7 +73,7 @@ def _installed(path: Path) -> Path:
         return path
 
 
-def describe(path: Path, options: MeshReading) -> Description:
+def describe(path: Path, options: MeshReading) -> Report:
     """Open whatever ``path`` is and describe it."""
     from sd2core.cli.reading import (
         load_mesh_from_options,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.output import picked, print_facts, print_json, progress_bar
+from sd2core.cli.output import Report, picked, progress_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,31 +29,7 @@ if TYPE_CHECKING:
 _SPAN = ("start_s", "end_s", "label", "person")
 
 
-@dataclass
-class Description:
-    """Content of a file, for programs (``data``) and for people (``facts``)."""
-
-    title: str
-    data: dict[str, Any]
-    facts: dict[str, str]
-    notes: tuple[str, ...] = ()
-    parts: list[Description] = field(default_factory=list)
-
-
-def show(description: Description, *, as_json: bool) -> None:
-    """Print a description and its parts."""
-    if as_json:
-        print_json(description.data)
-        return
-    print_facts(description.title, description.facts)
-    for note in description.notes:
-        print(f"  note: {note}")
-    for part in description.parts:
-        print()
-        show(part, as_json=False)
-
-
-def describe_recording(recording: Recording, parts: list[Description]) -> Description:
+def describe_recording(recording: Recording, parts: list[Report]) -> Report:
     """Describe a recording and its parts; missing files are named."""
     from sd2core.recording.relinking import role_words
 
@@ -97,13 +73,13 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     if missing:
         notes += (f"find it with: sd2 relink {recording.folder} FOLDER",)
     notes += (*recording.notes, *beyond)
-    return Description(f"Recording {recording.folder}", data, facts, notes, parts)
+    return Report(f"Recording {recording.folder}", data, facts, notes, parts)
 
 
-def describe_parts(recording: Recording) -> list[Description]:
+def describe_parts(recording: Recording) -> list[Report]:
     """Open and describe each file of a recording, as far as it is there."""
     missing = recording.missing()
-    parts: list[Description] = []
+    parts: list[Report] = []
     if recording.video is not None and "video" not in missing:
         with recording.open_video() as video:
             parts.append(describe_video(recording.video, video))
@@ -123,7 +99,7 @@ def describe_parts(recording: Recording) -> list[Description]:
     return parts
 
 
-def describe_video(path: Path, video: VideoReader) -> Description:
+def describe_video(path: Path, video: VideoReader) -> Report:
     """Describe a video."""
     from sd2core.io.video_writing import HEADS_COVERED
 
@@ -139,10 +115,10 @@ def describe_video(path: Path, video: VideoReader) -> Description:
         "picture": f"{video.width} x {video.height} pixels" + (", heads covered" * covered),
         "time": video.timebase.words,
     }
-    return Description(f"Video {path}", data, facts, video.notes)
+    return Report(f"Video {path}", data, facts, video.notes)
 
 
-def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
+def describe_mesh(path: Path, mesh: MeshSequence) -> Report:
     """Describe a mesh by its first frame; a long one is not read whole."""
     from sd2core.io.fitted import fit_of, fitted_camera
 
@@ -181,10 +157,10 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
         if isinstance(stature_m, float | int)
         else "",
     }
-    return Description(f"Mesh {path}", data, facts, tuple(data["notes"]))
+    return Report(f"Mesh {path}", data, facts, tuple(data["notes"]))
 
 
-def describe_radar(path: Path) -> Description:
+def describe_radar(path: Path) -> Report:
     """Open a capture or a recorded map and describe it."""
     from sd2core.io.radar import holds_map, load_capture, load_recorded_map
 
@@ -193,7 +169,7 @@ def describe_radar(path: Path) -> Description:
     return describe_capture(path, load_capture(path))
 
 
-def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:
+def describe_recorded_map(path: Path, recorded: RecordedMap) -> Report:
     """Describe a recorded map and its labels."""
     inside = describe_map(path, recorded.doppler)
     spans = recorded.labels.spans
@@ -208,10 +184,10 @@ def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:
     facts = inside.facts
     if recorded.gesture:
         facts = facts | {"gesture": recorded.gesture, "labelled": labelled or "nowhere"}
-    return Description(f"Radar map {path}", data, facts, recorded.notes)
+    return Report(f"Radar map {path}", data, facts, recorded.notes)
 
 
-def describe_imu(path: Path) -> Description:
+def describe_imu(path: Path) -> Report:
     """Open samples of an inertial sensor and describe them."""
     from sd2core.imu.files import read_signals
     from sd2core.plausibility.samples import judge_inertial
@@ -241,7 +217,7 @@ def describe_imu(path: Path) -> Description:
     unlikely = judge_inertial(signals.times_s, signals.acceleration_mps2, signals.turn_rate_radps)
     notes = tuple(map(str, unlikely))
     data["notes"] = list(notes)
-    return Description(f"Inertial sensor {path}{simulated}", data, facts, notes)
+    return Report(f"Inertial sensor {path}{simulated}", data, facts, notes)
 
 
 def signals_data(signals: InertialSignals) -> dict[str, Any]:
@@ -269,7 +245,7 @@ def _denoiser(recording: Recording) -> str:
     return recording.bundled_denoiser or "none"
 
 
-def describe_capture(path: Path, capture: RadarCapture) -> Description:
+def describe_capture(path: Path, capture: RadarCapture) -> Report:
     """Describe a radar capture and what its radar can tell apart."""
     from sd2core.fmcw import limits
 
@@ -296,10 +272,10 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
         "time": capture.words,
         **limit_facts(config),
     }
-    return Description(f"Radar capture {path}", data, facts, tuple(capture.notes))
+    return Report(f"Radar capture {path}", data, facts, tuple(capture.notes))
 
 
-def describe_map(path: Path, doppler: DopplerMap) -> Description:
+def describe_map(path: Path, doppler: DopplerMap) -> Report:
     """Describe a Doppler map."""
     from sd2core.io.radar.point_maps import OF_POINTS
     from sd2core.plausibility.radar import judge_map
@@ -338,7 +314,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
     unlikely = judge_map(doppler.values, doppler.timebase.times_s, doppler.present, measured=noisy)
     notes = (*doppler.meta.get("notes", ()), *map(str, unlikely))
     simulated = " (of a simulated recording)" if doppler.of_simulated else ""
-    return Description(f"Doppler map {path}{simulated}", data, facts, notes)
+    return Report(f"Doppler map {path}{simulated}", data, facts, notes)
 
 
 def _people(bodies: Any) -> str:
@@ -470,7 +446,7 @@ def _labels(recording: Recording) -> str:
     return ", ".join(f"{count} x {label}" for label, count in counts.items())
 
 
-def _labels_beyond(recording: Recording, parts: list[Description]) -> tuple[str, ...]:
+def _labels_beyond(recording: Recording, parts: list[Report]) -> tuple[str, ...]:
     """Notes on labels beyond all parts, on the recording's clock."""
     from sd2core.plausibility.spans import judge_spans
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2core.cli.info.description import Description, axis_in_words, bins_in_words
-from sd2core.cli.output import counted, listed
+from sd2core.cli.info.description import axis_in_words, bins_in_words
+from sd2core.cli.output import Report, counted, listed
 from sd2core.datasets.card import describe_dataset, duration_text, limits
 from sd2core.datasets.reading import open_dataset
 from sd2core.files.stores import lost_in_words
@@ -16,7 +16,7 @@ from sd2core.pairs.store import PairSet
 from sd2core.plausibility.radar import judge_map
 
 
-def describe_dataset_at(path: Path) -> Description:
+def describe_dataset_at(path: Path) -> Report:
     """Describe a data set: how much, who, what is labelled, from where, and its limits."""
     with open_dataset(path) as dataset:
         card = describe_dataset(dataset)
@@ -40,10 +40,10 @@ def describe_dataset_at(path: Path) -> Description:
         "nulled bins": bins_in_words(axis, null_bins),
     }
     data = {"kind": "dataset", "path": str(path)} | card
-    return Description(f"Data set {path}", data, facts, tuple(limits(card)))
+    return Report(f"Data set {path}", data, facts, tuple(limits(card)))
 
 
-def describe_pairs(path: Path, pairs: PairSet) -> Description:
+def describe_pairs(path: Path, pairs: PairSet) -> Report:
     """Describe pairs: who, how much, what is labelled, from where it was seen."""
     minutes = {
         subject: sum(len(take.times_s) for take in pairs.takes if take.subject == subject)
@@ -96,7 +96,7 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
     if pairs.lost_frames:
         notes = (lost_in_words(pairs.lost_frames), *notes)
     data["notes"] = list(notes)
-    return Description(f"Pairs {path}", data, facts, notes)
+    return Report(f"Pairs {path}", data, facts, notes)
 
 
 def _protocol_in_words(pairs: PairSet) -> str:

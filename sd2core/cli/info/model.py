@@ -9,7 +9,8 @@ from typing import Any
 from sd2core.classify.card import FORMAT as CLASSIFIER
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.files import describe_classifier
-from sd2core.cli.info.description import Description, axis_in_words, bins_in_words
+from sd2core.cli.info.description import axis_in_words, bins_in_words
+from sd2core.cli.output import Report
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.files import describe_model
 from sd2core.denoise.registry import MODELS, summary
@@ -20,14 +21,14 @@ _UNITS = {"mps": "m/s", "s": "s", "hz": "Hz", "m": "m"}
 _ABBREVIATIONS = ("mae", "rmse", "ssm")
 
 
-def describe_model_file(path: Path) -> Description:
+def describe_model_file(path: Path) -> Report:
     """Describe a model file without its weights."""
     if format_of(path) == CLASSIFIER:
         return describe_classifier_card(path, describe_classifier(path))
     return describe_card(path, describe_model(path))
 
 
-def describe_classifier_card(path: Path, card: ClassifierCard) -> Description:
+def describe_classifier_card(path: Path, card: ClassifierCard) -> Report:
     """Describe a classifier without its weights."""
     data = {"kind": "classifier", "path": str(path), **card.to_json()}
     shown = "whole columns" if card.features.kind == "columns" else "the strongest bin"
@@ -40,12 +41,10 @@ def describe_classifier_card(path: Path, card: ClassifierCard) -> Description:
         "parameters": f"{card.parameters:,}",
         **dict(_about(card.about)),
     }
-    return Description(
-        f"Classifier {path}" + (f": {card.title}" if card.title else ""), data, facts
-    )
+    return Report(f"Classifier {path}" + (f": {card.title}" if card.title else ""), data, facts)
 
 
-def describe_card(path: Path, card: ModelCard) -> Description:
+def describe_card(path: Path, card: ModelCard) -> Report:
     """Describe a denoiser without its weights."""
     data = {"kind": "model", "path": str(path), **card.to_json()}
     facts = {
@@ -56,7 +55,7 @@ def describe_card(path: Path, card: ModelCard) -> Description:
         **dict(_about(card.about)),
     }
     title = f"Denoiser {path}" + (f": {card.title}" if card.title else "")
-    return Description(title, data, facts)
+    return Report(title, data, facts)
 
 
 def model_words(card: ModelCard) -> str:

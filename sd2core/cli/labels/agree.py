@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import FrameTimes, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
-from sd2core.cli.output import counted, picked, print_json, print_rows
+from sd2core.cli.output import Report, counted, picked, print_rows
 from sd2core.options.kinds import Share
 from sd2core.options.records import ARGUMENT
 from sd2core.options.shared import Json
@@ -39,7 +40,7 @@ class Agree(FrameTimes, Json):
 
 
 @command("agree", Agree)
-def _agree(options: Agree) -> None:
+def _agree(options: Agree) -> Report:
     """Compare the labels of two people.
 
     Frame by frame by Cohen's kappa (1 is agreement, 0 is chance), span by span by
@@ -54,10 +55,7 @@ def _agree(options: Agree) -> None:
     a, b = labels_at(options.a, clock), labels_at(options.b, clock)
     clock = needed(with_rate(options, clock, a, b), "Comparing labels")
     result = agreement(a, b, clock, min_iou=options.min_iou, track=options.track)
-    if options.json:
-        print_json(_data(result))
-    else:
-        _print(result)
+    return Report("", _data(result), say=partial(_print, result))
 
 
 def _print(result: Agreement) -> None:

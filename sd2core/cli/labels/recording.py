@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import labels_at, recording_clock
-from sd2core.cli.output import counted, print_json, progress_bar
+from sd2core.cli.output import Report, counted, progress_bar
 from sd2core.cli.recording_maps import MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
@@ -159,7 +159,7 @@ def _nothing_to_cut(path: Path, labels: Labels, wanted: tuple[str, ...]) -> Sd2E
 
 
 @command("cut", Cut)
-def _cut(options: Cut) -> None:
+def _cut(options: Cut) -> Report:
     """Cut labelled spans out: video, mesh and maps of each.
 
     Makes a folder per span with video.mp4 (its very frames, encoded again), mesh.zarr,
@@ -195,21 +195,17 @@ def _cut(options: Cut) -> None:
         written = cut_out(
             source, cuts, options.out, replace_others=options.replace_others, progress=progress
         )
-    if options.json:
-        print_json(
-            {
-                "folder": str(options.out),
-                "written": [path.name for path in written],
-                "same": [cut.path.name for cut in cuts if cut.state == "same"],
-                "without_frame": [cut.span.id for cut in cuts if cut.state == "empty"],
-            }
-        )
-        return
-    same = sum(cut.state == "same" for cut in cuts)
-    print(
+    same = [cut.path.name for cut in cuts if cut.state == "same"]
+    return Report(
         f"{options.out}: {counted(len(written), 'span')} cut out"
-        + (f", {same} were there already" if same else "")
-        + ("." + left_out if (left_out := without_frame(cuts)) else "")
+        + (f", {len(same)} were there already" if same else "")
+        + ("." + left_out if (left_out := without_frame(cuts)) else ""),
+        {
+            "folder": str(options.out),
+            "written": [path.name for path in written],
+            "same": same,
+            "without_frame": [cut.span.id for cut in cuts if cut.state == "empty"],
+        },
     )
 
 

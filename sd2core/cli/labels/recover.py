@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import check_label_output
-from sd2core.cli.output import counted, picked, print_json, print_rows
+from sd2core.cli.output import Report, counted, picked, print_rows
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENT, OptionError
 from sd2core.options.shared import Json, Overwrite
@@ -47,7 +48,7 @@ class Recover(Overwrite, Json):
 
 
 @command("recover", Recover)
-def _recover(options: Recover) -> None:
+def _recover(options: Recover) -> Report:
     """List labels that were not saved when a window ended, or write them to a file.
 
     Opening the recording in the window offers them as well. Nothing is deleted here,
@@ -66,16 +67,13 @@ def _recover(options: Recover) -> None:
     for note in unsaved.notes:
         print(note, file=sys.stderr)
     if options.out is not None:
-        _write(options.out, options, offers)
-    elif options.json:
-        print_json({"recoveries": [_data(offer) for offer in offers]})
-    elif not offers:
-        print("There is nothing to recover.")
-    else:
-        _print(offers)
+        return _write(options.out, options, offers)
+    data = {"recoveries": [_data(offer) for offer in offers]}
+    say = partial(_print, offers) if offers else None
+    return Report("There is nothing to recover.", data, say=say)
 
 
-def _write(out: Path, options: Recover, offers: tuple[Recoverable, ...]) -> None:
+def _write(out: Path, options: Recover, offers: tuple[Recoverable, ...]) -> Report:
     from sd2core.labels.files import write_labels
 
     if not offers:
@@ -85,10 +83,8 @@ def _write(out: Path, options: Recover, offers: tuple[Recoverable, ...]) -> None
         )
     check_label_output(out)
     write_labels(out, offers[0].labels, recording=offers[0].recording)
-    if options.json:
-        print_json({"path": str(out)} | _data(offers[0]))
-    else:
-        print(f"Wrote {out} with {counted(len(offers[0].labels.spans), 'span')}")
+    title = f"Wrote {out} with {counted(len(offers[0].labels.spans), 'span')}"
+    return Report(title, {"path": str(out)} | _data(offers[0]))
 
 
 def _print(offers: tuple[Recoverable, ...]) -> None:
