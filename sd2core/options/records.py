@@ -92,7 +92,7 @@ class Section(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Heading that the options of a record stand under, and a sentence below it."""
+    """Heading that the options of a record, or one of them, stand under, and a sentence below."""
 
     title: str
     text: str | None = None
@@ -373,7 +373,7 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
             _note(notes, Typed),
             choices,
             place,
-            group,
+            _note(notes, Group) or group,
             section,
         )
 

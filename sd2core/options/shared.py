@@ -249,20 +249,7 @@ class Limbs(OptionRecord):
     limbs: bool = False
 
 
-class Texture(OptionRecord):
-    """How denoised maps are shown.
-
-    Parameters
-    ----------
-    texture : SEED
-        draw denoised maps as a radar would show them, with its speckle and gaps, instead of
-        the mean (SEED of the random numbers: 0)
-    """
-
-    texture: Annotated[Natural | None, Place(bare=0)] = None
-
-
-class Denoising(Texture):
+class Denoising(OptionRecord):
     """How maps are denoised: section ``[denoise]`` of a plan, and options of ``sd2 denoise``.
 
     Parameters
@@ -270,9 +257,13 @@ class Denoising(Texture):
     model : FILE|NAME
         a model file from `sd2 train`, or the name of one that is installed (default: of those
         that come with SD² Studio the one for limb maps, where there are such)
+    texture : SEED
+        draw denoised maps as a radar would show them, with its speckle and gaps, instead of
+        the mean (SEED of the random numbers: 0)
     """
 
     model: Text | None = None
+    texture: Annotated[Natural | None, Place(bare=0)] = None
 
 
 class RadarChoice(OptionRecord):

@@ -228,35 +228,7 @@ class TrainConfig:
         return replace(self, **changed)
 
 
-class _Learning(OptionRecord):
-    """More options of the model.
-
-    Parameters
-    ----------
-    set : NAME=VALUE
-        an option of the model, e.g. channels=64; may be given several times
-    """
-
-    GROUP = LEARNING
-
-    set: Annotated[tuple[Assignment, ...], Place(many="again")] = ()
-
-
-class _Background(OptionRecord):
-    """Training beside other work.
-
-    Parameters
-    ----------
-    background
-        one thread and nice 10, to work beside it
-    """
-
-    GROUP = MACHINE
-
-    background: bool = False
-
-
-class Train(_Learning, _Background, Json):
+class Train(Json):
     """Options of ``sd2 train``: its files, and what is given of each section of the settings.
 
     Parameters
@@ -269,6 +241,10 @@ class Train(_Learning, _Background, Json):
         go on with a run that was stopped or killed
     show_settings
         print all settings as TOML and train nothing
+    set : NAME=VALUE
+        an option of the model, e.g. channels=64; may be given several times
+    background
+        one thread and nice 10, to work beside it
     """
 
     inputs: Annotated[tuple[Path, ...], ARGUMENTS] = ()
@@ -279,6 +255,8 @@ class Train(_Learning, _Background, Json):
     training: Annotated[Mapping[str, Any], Section(TrainingConfig)] = field(default_factory=dict)
     data: Annotated[Mapping[str, Any], Section(DataConfig)] = field(default_factory=dict)
     machine: Annotated[Mapping[str, Any], Section(MachineConfig)] = field(default_factory=dict)
+    set: Annotated[tuple[Assignment, ...], Place(many="again"), LEARNING] = ()
+    background: Annotated[bool, MACHINE] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
