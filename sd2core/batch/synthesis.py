@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.batch.inputs import MeshInput, open_mesh
 from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_json
 from sd2core.files.texts import read_json
 from sd2core.options.synthesis import Synthesis
 from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -177,9 +176,8 @@ def _synthesizer(mesh: MeshInput, section: Synthesis, plan: dict[str, Any] | Non
 
 
 def chosen_plan(mesh: MeshInput, section: Synthesis, choosing: Choosing) -> dict[str, Any]:
-    """Return the accuracy plan that the first process chose: measured costs always differ."""
-    path = choosing.path
-    if (known := read_plan_of(path)) is not None:
+    """Return the accuracy plan of a mesh, chosen once and kept."""
+    if (known := read_plan_of(choosing.path)) is not None:
         return known
     from sd2core.accuracy.places import choose_for_places
 
@@ -191,18 +189,9 @@ def chosen_plan(mesh: MeshInput, section: Synthesis, choosing: Choosing) -> dict
         section.tolerance,
         chosen_options(section),
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            json.dump({"plan": placed.plan.to_json(), "provenance": placed.provenance()}, stream)
-        os.link(temporary, path)
-    except FileExistsError:
-        pass  # another process was first
-    finally:
-        os.unlink(temporary)
-    known = read_plan_of(path)
-    assert known is not None
+    known = {"plan": placed.plan.to_json(), "provenance": placed.provenance()}
+    choosing.path.parent.mkdir(parents=True, exist_ok=True)
+    atomic_write_json(choosing.path, known)
     return known
 
 
