@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +24,11 @@ from sd2core.sensor import VirtualSensor
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.gridspec import GridSpecBase
+    from matplotlib.transforms import Bbox
 
 _INK, _PAPER = "#1d2127", "#f3f4f6"
+_NAMES: dict[Row, str] = {"video": "Video", "mesh": "Mesh", "overlay": "Mesh over video"}
 _PICTURE_IN = 1.3
 """Width of one picture."""
 _GAP_IN, _LABEL_IN, _TITLE_IN, _BAR_IN = 0.05, 0.28, 0.3, 0.95
@@ -68,33 +70,29 @@ def plot_strip(
     Sd2Error
         If a row needs what is not there, or a frame does not exist.
     """
-    from matplotlib.figure import Figure
-
     options = options or StripOptions()
     check_strip(source, frames, options)
     bodies = [Body.at(source, frame, options) for frame in frames]
     box = _strip_box(source, bodies, options)
-    layout = _Layout(len(frames), options, box)
-    figure = Figure(figsize=(layout.width_in, layout.height_in), dpi=_PIXELS_PER_INCH / 2)
-    figure.set_facecolor("white")
-    for column, (frame, body) in enumerate(zip(frames, bodies, strict=True)):
-        progress(column, len(frames))
-        for row in range(len(options.rows)):
-            axes = figure.add_axes(layout.place(column, row))
+    figure, cells = _figure(len(frames), options, box)
+    for number, (frame, body) in enumerate(zip(frames, bodies, strict=True)):
+        progress(number, len(frames))
+        block, column = divmod(number, options.columns)
+        for row, what in enumerate(options.rows):
+            axes = figure.add_subplot(cells[block][row, column])
             axes.set(xlim=(0, box.width), ylim=(box.height, 0), xticks=[], yticks=[])
             axes.set_facecolor(_PAPER)
-            for spine in axes.spines.values():
-                spine.set_visible(False)
-            _draw_picture(axes, options.rows[row], source, frame, body, box, options)
+            axes.spines[:].set_visible(False)
+            _draw_picture(axes, what, source, frame, body, box, options)
             if row == 0:
                 time = f"{source.clock.time_of(frame):.2f} s"
-                over = partial(axes.text, y=1.02, transform=axes.transAxes)
-                over(0, s=time, fontsize=7, color=_INK)
-                over(1, s=str(frame), fontsize=6, color=_MUTED, ha="right")
-            if column % options.columns == 0:
-                _write_row(axes, options.rows[row], source.simulated)
-    if options.colour == "velocity" and "mesh" in options.rows:
-        _add_bar(figure, layout, options.v_max_mps)
+                axes.set_title(time, loc="left", pad=2, fontsize=7, color=_INK)
+                axes.set_title(str(frame), loc="right", pad=2, fontsize=6, color=_MUTED)
+            if column == 0:
+                name = _NAMES[what] + " (simulated)" * source.simulated
+                axes.set_ylabel(name, fontsize=7, color=_INK)
+    if _has_bar(options):
+        _add_bar(figure, cells[0][:, :].get_position(figure), options.v_max_mps)
     progress(len(frames), len(frames))
     return figure
 
@@ -128,66 +126,45 @@ def save_strip(
     save_figure(figure, path, provenance, _PIXELS_PER_INCH)
 
 
-class _Layout:
-    """Layout of the strip, in inches from the top left."""
+def _figure(count: int, options: StripOptions, box: Frame) -> tuple[Figure, list[GridSpecBase]]:
+    """An empty figure, and the places of pictures in it, block by block."""
+    from matplotlib.figure import Figure
 
-    def __init__(self, count: int, options: StripOptions, box: Frame) -> None:
-        self._columns = min(count, options.columns)
-        self._rows = len(options.rows)
-        self._blocks = math.ceil(count / options.columns)
-        self._picture_in = _PICTURE_IN * box.height / box.width
-        self._block_in = _TITLE_IN + self._rows * (self._picture_in + _GAP_IN)
-        bar = options.colour == "velocity" and "mesh" in options.rows
-        self._pictures_in = self._columns * (_PICTURE_IN + _GAP_IN)
-        self.width_in = _LABEL_IN + self._pictures_in + (_BAR_IN if bar else 0.0)
-        self.height_in = self._blocks * self._block_in + _GAP_IN
-
-    def place(self, column: int, row: int) -> tuple[float, float, float, float]:
-        """Left, bottom, width and height of a picture, as shares of the figure."""
-        block, column = divmod(column, self._columns)
-        left = _LABEL_IN + column * (_PICTURE_IN + _GAP_IN)
-        top = block * self._block_in + _TITLE_IN + row * (self._picture_in + _GAP_IN)
-        return self._shares(left, top, _PICTURE_IN, self._picture_in)
-
-    @property
-    def bar(self) -> tuple[float, float, float, float]:
-        """The colour bar, beside the first block."""
-        height = min(self._block_in - _TITLE_IN - _GAP_IN, 2.2)
-        return self._shares(_LABEL_IN + self._pictures_in + 0.1, _TITLE_IN, 0.1, height)
-
-    def _shares(
-        self, left: float, top: float, width: float, height: float
-    ) -> tuple[float, float, float, float]:
-        return (
-            left / self.width_in,
-            1 - (top + height) / self.height_in,
-            width / self.width_in,
-            height / self.height_in,
-        )
-
-
-def _write_row(axes: Axes, row: Row, simulated: bool) -> None:
-    name = {"video": "Video", "mesh": "Mesh", "overlay": "Mesh over video"}[row]
-    axes.text(
-        -0.05,
-        0.5,
-        f"{name} (simulated)" if simulated else name,
-        transform=axes.transAxes,
-        rotation=90,
-        ha="right",
-        va="center",
-        fontsize=7,
-        color=_INK,
+    rows, columns = len(options.rows), min(count, options.columns)
+    blocks = math.ceil(count / options.columns)
+    picture_in = _PICTURE_IN * box.height / box.width
+    across_in = columns * (_PICTURE_IN + _GAP_IN) - _GAP_IN
+    block_in = rows * (picture_in + _GAP_IN) - _GAP_IN
+    width_in = _LABEL_IN + across_in + _GAP_IN + _BAR_IN * _has_bar(options)
+    height_in = blocks * (_TITLE_IN + block_in + _GAP_IN) + _GAP_IN
+    figure = Figure(figsize=(width_in, height_in), dpi=_PIXELS_PER_INCH / 2)
+    figure.set_facecolor("white")
+    below = figure.add_gridspec(
+        blocks,
+        1,
+        left=_LABEL_IN / width_in,
+        right=(_LABEL_IN + across_in) / width_in,
+        top=1 - _TITLE_IN / height_in,
+        bottom=2 * _GAP_IN / height_in,
+        hspace=(_GAP_IN + _TITLE_IN) / block_in,
     )
+    gaps = {"wspace": _GAP_IN / _PICTURE_IN, "hspace": _GAP_IN / picture_in}
+    return figure, [below[block].subgridspec(rows, columns, **gaps) for block in range(blocks)]
 
 
-def _add_bar(figure: Figure, layout: _Layout, v_max_mps: float) -> None:
+def _has_bar(options: StripOptions) -> bool:
+    return options.colour == "velocity" and "mesh" in options.rows
+
+
+def _add_bar(figure: Figure, pictures: Bbox, v_max_mps: float) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
 
     colours = ScalarMappable(Normalize(-v_max_mps, v_max_mps), ListedColormap(DIVERGING / 255))
-    axes = figure.add_axes(layout.bar)
-    bar = figure.colorbar(colours, cax=axes)
+    width_in, height_in = figure.get_size_inches()
+    high = min(pictures.height, 2.2 / height_in)
+    place = (pictures.x1 + 0.15 / width_in, pictures.y1 - high, 0.1 / width_in, high)
+    bar = figure.colorbar(colours, cax=figure.add_axes(place))
     bar.set_ticks([-v_max_mps, -v_max_mps / 2, 0, v_max_mps / 2, v_max_mps])
     bar.set_ticklabels(
         [f"{value:+g}".replace("-", "−") if value else "0" for value in bar.get_ticks()]
