@@ -89,8 +89,6 @@ class SerialS4Denoiser(S4Denoiser):
         cells, state = super().chunk(self._cells(values), state)
         return cells.view(*values.shape[:2], self.bins), state
 
-    step = Denoiser.step  # one frame is a chunk of as many cells as there are bins
-
     def _cells(self, values: Tensor) -> Tensor:
         """Values of every cell, (batch, frames · bins, channels)."""
         return self.pictures(values).flatten(2).transpose(1, 2)

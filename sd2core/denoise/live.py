@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sized
 from dataclasses import replace
 from typing import Any
 
@@ -111,7 +110,7 @@ class TrainedDenoiser:
         the unit of the synthetic maps of the training, and the result is in that of its radar
         maps. Of several persons (:meth:`by_person`) the answers are added up.
         """
-        each = self.by_person(energies, ndim=2)
+        each = self.by_person(energies)
         answer = np.zeros((len(energies), self.card.axis.bins), np.float32)
         if not len(energies):
             return answer
@@ -125,16 +124,15 @@ class TrainedDenoiser:
             answer += self.expanded(run(given, counting), given)
         return answer
 
-    def by_person(self, energies: NDArray[np.float32], *, ndim: int) -> list[NDArray[np.float32]]:
-        """Energies (…, features) of each person; of limb maps of several they stand side by side.
+    def by_person(self, energies: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+        """Energies (frames, features) of each person, of which limb maps stand side by side.
 
         Raises Sd2Error when they are of another number of axes or of features.
         """
         features = self.card.features
         persons, more = divmod(energies.shape[-1], features)
-        if energies.ndim != ndim or more or not (persons == 1 or (persons and self.card.parts)):
-            wanted = f"({features},)" if ndim == 1 else f"(frames, {features})"
-            raise Sd2Error(f"The values are of shape {energies.shape}", wanted)
+        if energies.ndim != 2 or more or not (persons == 1 or (persons and self.card.parts)):
+            raise Sd2Error(f"The values are of shape {energies.shape}", f"(frames, {features})")
         return np.split(energies, persons, axis=-1)
 
     def compressed(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -286,84 +284,55 @@ class LiveDenoiser:
             self._state = None if self._causal is None else self._causal.initial_state(1)
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
-        """Denoise the next frame, (bins,), of energies (features,).
-
-        Without a person (``present`` False) the result is empty, and a new clip begins.
-        """
-        each = self._trained.by_person(energies, ndim=1)
-        if len(each) > 1:
-            return _summed(
-                live.step(one, present) for live, one in zip(self._live(each), each, strict=True)
-            )
-        if not present:
-            self.reset()
-            return np.zeros(self._trained.card.axis.bins, np.float32)
-        given = self._trained.compressed(energies)
-        return self._trained.expanded(self._answer(given), given)
+        """Denoise the next frame, (bins,), of energies (features,), see :meth:`advance`."""
+        return self.advance(energies[None], np.array([present]))[0]
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_] | None = None
     ) -> NDArray[np.float32]:
-        """Denoise the next frames, (frames, features), as :meth:`step` does, at less cost.
+        """Denoise the next frames, (frames, bins), of energies (frames, features).
 
-        ``present`` is as for :meth:`step`, one per frame; None: a person is in all.
+        Without a person (``present`` False, one per frame; None: a person is in all) the result is
+        empty, and a new clip begins.
         """
-        each = self._trained.by_person(energies, ndim=2)
+        each = self._trained.by_person(energies)
         if len(each) > 1:
-            return _summed(
-                live.advance(one, present) for live, one in zip(self._live(each), each, strict=True)
-            )
-        mask = Presence.of(present, len(energies)).present
+            if not self._of_persons:
+                self._of_persons = [LiveDenoiser(self._trained) for _ in each]
+            both = zip(self._of_persons, each, strict=True)
+            return np.asarray(sum(live.advance(one, present) for live, one in both), np.float32)
         answers = np.zeros((len(energies), self._trained.card.axis.bins), np.float32)
-        if self._causal is None:
-            for frame, values in enumerate(energies):
-                answers[frame] = self.step(values, bool(mask[frame]))
-            return answers
         begins = 0
-        for start, stop in runs(mask):
+        for start, stop in runs(Presence.of(present, len(energies)).present):
             if start > begins:
                 self.reset()
-            answers[start:stop] = self._run(self._causal, energies[start:stop])
+            answers[start:stop] = self._run(energies[start:stop])
             begins = stop
         if begins < len(energies):
             self.reset()
         return answers
 
-    def _live(self, each: Sized) -> list[LiveDenoiser]:
-        """One for each person."""
-        if not self._of_persons:
-            self._of_persons = [LiveDenoiser(self._trained) for _ in range(len(each))]
-        return self._of_persons
-
-    def _run(self, causal: Denoiser, energies: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _run(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Denoise frames without a gap."""
         trained = self._trained
         compressed = trained.compressed(energies)
-        done = np.empty((len(compressed), trained.card.axis.bins), np.float32)
+        answers = []
         with torch.no_grad():
-            for start in range(0, len(compressed), CHUNK):
-                chunk = torch.from_numpy(compressed[start : start + CHUNK])[None]
-                answer, self._state = causal.chunk(chunk.to(trained.device), self._state)
-                done[start : start + CHUNK] = answer[0].cpu().numpy()
-        return trained.expanded(done, compressed)
+            if self._causal is None:
+                answers = [self._of_window(frame) for frame in compressed]
+            else:
+                for chunk in torch.from_numpy(compressed).to(trained.device).split(CHUNK):
+                    answer, self._state = self._causal.chunk(chunk[None], self._state)
+                    answers.append(answer[0])
+        return trained.expanded(torch.cat(answers).cpu().numpy(), compressed)
 
-    def _answer(self, compressed: NDArray[np.float32]) -> NDArray[np.float32]:
-        network, device = self._trained.network, self._trained.device
-        answer: NDArray[np.float32]
-        with torch.no_grad():
-            if self._causal is not None:
-                frame = torch.from_numpy(compressed)[None].to(device)
-                tensor, self._state = self._causal.step(frame, self._state)
-                answer = tensor[0].cpu().numpy()
-                return answer
-            self._frames.append(compressed)
-            known = np.stack(self._frames)
-            missing = (network.window or LENGTH) - len(known)
-            # The past is mirrored until there is enough of it.
-            known = np.pad(known, ((missing, 0), (0, 0)), "symmetric")
-            answer = network(torch.from_numpy(known)[None].to(device))[0, -1].cpu().numpy()
-        return answer
-
-
-def _summed(answers: Iterable[NDArray[np.float32]]) -> NDArray[np.float32]:
-    return np.asarray(sum(answers), np.float32)
+    def _of_window(self, compressed: NDArray[np.float32]) -> torch.Tensor:
+        """Answer (1, bins) to a frame, as the last one of its window."""
+        network = self._trained.network
+        self._frames.append(compressed)
+        known = np.stack(self._frames)
+        missing = (network.window or LENGTH) - len(known)
+        # The past is mirrored until there is enough of it.
+        known = np.pad(known, ((missing, 0), (0, 0)), "symmetric")
+        answer: torch.Tensor = network(torch.from_numpy(known)[None].to(self._trained.device))
+        return answer[0, -1:]

@@ -53,11 +53,6 @@ class Denoiser(nn.Module):
         """Denoise the next frames, as :meth:`forward`; also returns the state after them."""
         raise NotImplementedError(f"{type(self).__name__} looks at later frames, too")
 
-    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """Denoise the next frame (batch, features)."""
-        answer, state = self.chunk(frame[:, None], state)
-        return answer[:, 0], state
-
     def initial_state(self, batch: int = 1) -> State:
         """State before the first frame."""
         raise NotImplementedError(f"{type(self).__name__} looks at later frames, too")
@@ -125,11 +120,6 @@ class Corrected(Denoiser):
         """Denoise the next frames, as :meth:`forward`."""
         answer, state = self.network.chunk(values[..., self._first :], state)
         return answer + self._of_frame(values), state
-
-    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """Denoise the next frame."""
-        answer, state = self.network.step(frame[..., self._first :], state)
-        return answer + self._of_frame(frame), state
 
     def initial_state(self, batch: int = 1) -> State:
         """State of the network before the first frame."""

@@ -11,7 +11,7 @@ from scipy.fft import next_fast_len
 from torch import Tensor
 from torch.nn import functional
 
-SMALLEST_VARIANCE = 1e-5
+_SMALLEST_VARIANCE = 1e-5
 
 
 def normalise(signal: Tensor) -> tuple[Tensor, Tensor]:
@@ -28,7 +28,7 @@ class _Normalise(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, signal: Tensor) -> tuple[Tensor, Tensor]:
         normalised = signal - signal.mean(0)
-        scale = normalised.square().mean(0).add_(SMALLEST_VARIANCE).rsqrt_()
+        scale = normalised.square().mean(0).add_(_SMALLEST_VARIANCE).rsqrt_()
         normalised *= scale
         ctx.save_for_backward(normalised, scale)
         return normalised, signal.view_as(signal)

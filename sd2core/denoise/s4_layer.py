@@ -32,7 +32,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from sd2core.denoise.s4_functions import SMALLEST_VARIANCE, convolution, mix_gated, normalise
+from sd2core.denoise.s4_functions import convolution, mix_gated, normalise
 from sd2core.denoise.s4_recurrence import BLOCK
 from sd2core.denoise.s4_space import DT_MAX, DT_MIN, Kernel, StateSpace, joint_kernels
 from sd2core.errors import Sd2Error
@@ -80,19 +80,12 @@ class S4Layer(nn.Module):
         y = convolution(u, *kernels)
         return self._mixed(y, signal, self._dropped(y))
 
-    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """Advance by one frame, (B, H) → (B, H), by the recurrence; returns the next state, too."""
-        u = functional.layer_norm(frame, (self.channels,), eps=SMALLEST_VARIANCE)
-        y, state = self._live().recurrence().step(u.t().double(), state)
-        both = self.mixing(functional.gelu(y.t().to(frame.dtype)))
-        return frame + functional.glu(both), state
-
     def initial_state(self, batch: int) -> State:
         """Zero state before the first frame."""
         return self._live().recurrence().initial_state(batch)
 
     def chunk(self, signal: Tensor, state: State) -> tuple[Tensor, State]:
-        """Advance by any number of frames (B, l, H), as so many steps would."""
+        """Advance by any number of frames (B, l, H), by the recurrence."""
         first = _channels_first(signal)
         length = first.shape[-1]
         u = normalise(first)[0].double()

@@ -41,14 +41,6 @@ class S4Stack(nn.Module):
             after.append(one)
         return self.head(hidden), after
 
-    def step(self, frame: Tensor, state: list[State]) -> tuple[Tensor, list[State]]:
-        """Advance by one frame (B, …)."""
-        hidden, after = self.lift(frame), []
-        for layer, one in zip(self.layers, state, strict=True):
-            hidden, one = layer.step(hidden, one)
-            after.append(one)
-        return self.head(hidden), after
-
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
         """State-space parameters of all layers."""
         for layer in self.layers:

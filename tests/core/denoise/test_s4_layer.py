@@ -77,10 +77,10 @@ def test_chunks_are_the_whole(kernel: str) -> None:
         whole = layer(x)
         state, frames = layer.initial_state(3), []
         for t in range(x.shape[1]):
-            frame, state = layer.step(x[:, t], state)
+            frame, state = layer.chunk(x[:, t, None], state)
             frames.append(frame)
     assert largest(torch.cat(parts, 1) - whole) < 5e-6
-    assert largest(torch.stack(frames, 1) - whole) < 5e-6
+    assert largest(torch.cat(frames, 1) - whole) < 5e-6
 
 
 def test_two_directions_see_both_and_cannot_run_live() -> None:
@@ -176,8 +176,8 @@ def test_no_logarithm_is_too_large(kernel: str, log_dt: float, log_decay: float)
             assert parameter.grad is not None
             assert parameter.grad.isfinite().all()
         with torch.no_grad():
-            frame, state = layer.step(x[:, 0], layer.initial_state(17))
-        assert largest(frame - out[:, 0]) <= 1e-5 * largest(out[:, 0])
+            frame, state = layer.chunk(x[:, :1], layer.initial_state(17))
+        assert largest(frame - out[:, :1]) <= 1e-5 * largest(out[:, 0])
         assert state.isfinite().all()
 
 
@@ -301,8 +301,8 @@ class TestKept:
             fresh.load_state_dict(layer.state_dict())
             with torch.no_grad():
                 assert torch.equal(layer(x), fresh(x))
-                frame = layer.step(x[:, 0], layer.initial_state(1))[0]
-                assert torch.equal(frame, fresh.step(x[:, 0], fresh.initial_state(1))[0])
+                frame = layer.chunk(x[:, :1], layer.initial_state(1))[0]
+                assert torch.equal(frame, fresh.chunk(x[:, :1], fresh.initial_state(1))[0])
                 chunk = layer.chunk(x, layer.initial_state(1))[0]
                 assert torch.equal(chunk, fresh.chunk(x, fresh.initial_state(1))[0])
 
