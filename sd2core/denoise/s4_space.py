@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import torch
 from torch import Tensor, nn
@@ -45,8 +44,7 @@ class Keeping(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self._kept: dict[int | str, Any] = {}
-        self._held: tuple[Tensor, ...] = ()
-        self._counts: tuple[int, ...] = ()
+        self._made_of: list[Tensor] = []
 
     def learning(self) -> bool:
         """Whether the parameters may be about to change, so that nothing is kept."""
@@ -56,36 +54,23 @@ class Keeping(nn.Module):
         """Give what was made under a key, or make it."""
         if self.learning():
             return make()
-        # Parameters count what is done to them in place; all else that can change them goes
-        # through the methods below.
-        held = tuple(self._parameters.values())
-        counts = tuple(0 if p.is_inference() else p._version for p in held)
-        same = counts == self._counts and all(map(operator.is_, held, self._held))
-        if not same or len(self._kept) > MAX_KEPT:
-            self._forget()
-            self._held, self._counts = held, counts
+        now = [*self._parameters.values()]
+        if len(self._kept) > MAX_KEPT or not _are_equal(self._made_of, now):
+            self._kept, self._made_of = {}, [one.detach().clone() for one in now]
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
 
-    def _forget(self) -> None:
-        self._kept, self._held, self._counts = {}, (), ()
-
-    def train(self, mode: bool = True) -> Self:
-        """Set the mode as `nn.Module.train` does, and drop what was derived from the weights."""
-        self._forget()
-        return super().train(mode)
-
-    def _apply(self, *args: Any, **options: Any) -> Any:
-        self._forget()
-        return super()._apply(*args, **options)
-
-    def _load_from_state_dict(self, *args: Any, **options: Any) -> None:
-        self._forget()
-        super()._load_from_state_dict(*args, **options)
-
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_kept": {}, "_held": (), "_counts": ()}
+        return {**self.__dict__, "_kept": {}, "_made_of": []}
+
+
+def _are_equal(some: Sequence[Tensor], others: Sequence[Tensor]) -> bool:
+    """True for tensors of the same kind, place and numbers, none of which is NaN."""
+    return len(some) == len(others) and all(
+        one.dtype == other.dtype and one.device == other.device and torch.equal(one, other)
+        for one, other in zip(some, others, strict=True)
+    )
 
 
 class StateSpace(Keeping):
