@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner, delayed
+from sd2app.background.latest import BackgroundModel, LatestRunner
 from sd2app.background.model_worker.client import RemoteClassifier, RemoteSession
 from sd2app.denoise.map import cut_out
 from sd2app.session.maps import MapModel
@@ -19,7 +19,6 @@ from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.numerics.byte_budget import ByteBudget
-from sd2core.timebase import Timebase
 
 _LATE_S = 0.2
 """Largest accepted lag behind the clock while a map grows frame by frame."""
@@ -27,10 +26,7 @@ _LATER_S = 0.5
 """Largest accepted lag in addition to the classifier's own delay; its age is shown."""
 
 _AT_ONCE = 2048
-"""Frames that are classified together."""
-
-_BETWEEN_MS = 120
-"""Shortest interval between updates while a long map is painted piece by piece."""
+"""Frames that a classifier is asked about together; in between a denoiser is heard."""
 
 
 @dataclass(frozen=True)
@@ -49,20 +45,18 @@ class ClassReading:
         return max(range(len(self.shares)), key=self.shares.__getitem__)
 
 
-class _Going(NamedTuple):
-    """Session of a stretch that is classified up to a frame."""
+class _Reached(NamedTuple):
+    """Session of a stretch that grows, and how far it has come."""
 
     session: RemoteSession
     start: int
     next: int
-    answered: int
-    """The answers of frames from here on may change with the next frames."""
+    answered: int  # answers of frames from here on are owed until there are more frames
 
 
-class _Piece(NamedTuple):
-    start: int
-    shares: NDArray[np.float32]
-    going: _Going | None
+class _Answers(NamedTuple):
+    pieces: list[tuple[int, NDArray[np.float32]]]  # first frames, and shares from there on
+    reached: _Reached | None
 
 
 class ClassTrack(BackgroundModel):
@@ -84,9 +78,7 @@ class ClassTrack(BackgroundModel):
         self._classifier: RemoteClassifier | None = None
         self.card: ClassifierCard | None = None  # of the classifier at work
         self.problem = ""  # why this map cannot be classified
-        self._runner = LatestRunner("classify", self, self._finish, self._fail)
-        self._runner.partial.connect(self._receive)
-        self._calm = delayed(self._go_on, _BETWEEN_MS, self)
+        self._runner = LatestRunner("classify", self, self._receive, self._fail)
         self._forget()
 
     def _forget(self) -> None:
@@ -96,10 +88,9 @@ class ClassTrack(BackgroundModel):
         # it is now; those of the others are older.
         self.shares = np.zeros((0, 0), np.float32)
         self.done = np.zeros(0, bool)
-        self._revision = -1
-        self._going: _Going | None = None
-        self._until = 0
-        self._again = False
+        self._revision = self._asked = -1  # of the map as it is, and as it was asked about
+        self._until = 0  # last frame that was known then, and one
+        self._reached: _Reached | None = None
 
     # --- what is known --------------------------------------------------------------------
 
@@ -168,7 +159,6 @@ class ClassTrack(BackgroundModel):
 
     def _stop(self) -> None:
         self._runner.cancel()
-        self._calm.stop()
         self._forget()
 
     def _restart(self) -> None:
@@ -193,54 +183,33 @@ class ClassTrack(BackgroundModel):
             self._fail(error)
             return
         self._take(source.map, source.known)
-        if self._restore() or self._again:
-            return
-        if np.count_nonzero(self._known & ~self.done) <= _AT_ONCE:
-            self._calm.stop()
+        if not self._restore():
             self._go_on()
-        elif not self._calm.isActive():
-            self._calm.start()
 
     def _take(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> None:
-        """Copy values, which may change while they are classified."""
+        """Copy a map, which may change in place, and forget answers to what was another."""
         assert self.card is not None
-        before = self._given
-        count = 0 if before is None else len(before.timebase)
-        if before is None or not np.array_equal(before.times_s, doppler.times_s[:count]):
-            self.shares = np.full((len(known), len(self.card.classes)), np.nan, np.float32)
-            self.done = np.zeros(len(known), bool)
-            before, first, values = None, 0, doppler.values.copy()
-        else:
-            if count < len(known):
-                before = self._lengthen(before, doppler.timebase)
-            # Of a long map little is known while it grows frame by frame: no more is looked at.
-            numbers = np.flatnonzero(known | self._known)
-            start, stop = (int(numbers[0]), int(numbers[-1]) + 1) if numbers.size else (0, 0)
-            part = slice(start, stop)
-            differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
-            differs |= self._known[part] != known[part]
-            differs |= before.present_mask[part] != doppler.present_mask[part]
-            first = start + int(differs.argmax()) if differs.any() else len(known)
-            values = before.values
         self.problem = ""
-        # What was known of this frame and is another now has been seen by earlier answers.
-        seen = first < len(known) and before is not None and bool(self._known[first])
-        self.done[first - (min(self.card.delay_frames, first) if seen else 0) :] = False
-        # What is under way is still right where the map only grew behind it.
-        self._again = self._runner.busy and first >= self._until
-        if self._runner.busy and not self._again:
-            # The other side may have gone on without anybody to take its answer.
+        before, frames, count = self._given, len(known), len(self._known)
+        shares = np.full((frames, len(self.card.classes)), np.nan, np.float32)
+        done, first = np.zeros(frames, bool), 0
+        if before is not None and np.array_equal(before.times_s, doppler.times_s[:count]):
+            differs = (before.values != doppler.values[:, :count]).any(axis=0)
+            differs |= self._known != known[:count]
+            differs |= before.present_mask != doppler.present_mask[:count]
+            first = int(differs.argmax()) if differs.any() else count
+            # What was known of this frame and is another now has been seen by earlier answers.
+            seen = self.card.delay_frames if first < count and self._known[first] else 0
+            right = max(first - seen, 0)
+            shares[:count], done[:right] = self.shares, self.done[:right]
+        if first < self._until:
+            # Its session may have gone on without anybody to take the answer.
             self._runner.cancel()
-            self._going = None
-        if self._going is not None and self._going.next > first:
-            self._going = None
-        if before is not None:
-            # What is read meanwhile is before it, or of no interest any more.
-            values[:, first:stop] = doppler.values[:, first:stop]
-        self._given, self._known = replace(doppler, values=values), known.copy()
+            self._reached = None
         nobody = known & ~doppler.present_mask
-        self.shares[nobody] = self.card.no_person()
-        self.done[nobody] = True
+        shares[nobody], done[nobody] = self.card.no_person(), True
+        self._given, self._known = replace(doppler, values=doppler.values.copy()), known.copy()
+        self.shares, self.done = shares, done
         self.changed.emit()
 
     @property
@@ -251,66 +220,33 @@ class ClassTrack(BackgroundModel):
     def _restore(self) -> bool:
         """Show what the classifier answered before of the same map."""
         kept = self._results.get(self._key)
-        if kept is None or self._again or self.done.all():
+        if kept is None or self.done.all():
             return False
-        self._calm.stop()
         self._runner.cancel()
-        self.shares[:], self.done[:], self._going = kept, True, None
+        self.shares[:], self.done[:], self._reached = kept, True, None
         self.changed.emit()
         return True
-
-    def _lengthen(self, before: DopplerMap, timebase: Timebase) -> DopplerMap:
-        """Make room for frames that were added to the map."""
-        more = len(timebase) - len(self._known)
-        self._known = np.append(self._known, np.zeros(more, bool))
-        self.done = np.append(self.done, np.zeros(more, bool))
-        self.shares = np.pad(self.shares, ((0, more), (0, 0)), constant_values=np.nan)
-        values = np.pad(before.values, ((0, 0), (0, more)))
-        present = np.append(before.present_mask, np.ones(more, bool))
-        return replace(before, values=values, timebase=timebase, present=present)
 
     # --- classifying ----------------------------------------------------------------------
 
     def _go_on(self) -> None:
-        doppler, classifier, card = self._given, self._classifier, self.card
-        if doppler is None or classifier is None or card is None:
+        """Ask about the map as it is, unless that was done or another answer is awaited."""
+        doppler, classifier, known = self._given, self._classifier, self._known
+        waiting = np.flatnonzero(known & ~self.done)
+        if doppler is None or classifier is None or not waiting.size or self._runner.busy:
             return
-        waiting = self._known & ~self.done
-        numbers = np.flatnonzero(waiting)
-        if not numbers.size:
-            return
-        self._until = int(numbers[-1]) + 1
-        known, going, rate_hz = self._known, self._going, card.frame_rate_hz
-        is_growing = self.source is not None and self.source.growing
+        self._asked, self._until, reached = self._revision, int(waiting[-1]) + 1, self._reached
+        grows = self.source is not None and self.source.growing
+        self._runner.submit(
+            lambda emit: _answers(classifier, doppler, known, waiting, grows, reached)
+        )
 
-        def work(emit: Emit) -> None:
-            known_map = replace(doppler, present=doppler.present_mask & known)
-            for start, stop in stretches(known_map, rate_hz):
-                if not waiting[start:stop].any():
-                    continue
-                # What follows is still to come: the last frames have no answer until then.
-                grows = not known[stop] if stop < len(known) else is_growing
-                if is_regular(doppler.times_s[start:stop], rate_hz):
-                    _in_order(classifier, doppler, (start, stop), grows, going, emit)
-                else:
-                    cut = cut_out(doppler, start, doppler.values[:, start:stop])
-                    cut = replace(cut, present=None)
-                    owed = round(card.delay_s * cut.timebase.frames_per_s) if grows else 0
-                    shares = classifier.probabilities(cut)
-                    emit(_Piece(start, shares[: max(len(shares) - owed, 0)], None))
-
-        self._runner.submit(work)
-
-    def _receive(self, piece: _Piece) -> None:
-        stop = piece.start + len(piece.shares)
-        self.shares[piece.start : stop] = piece.shares
-        self.done[piece.start : stop] = True
-        self._going = piece.going
-        self.changed.emit()
-
-    def _finish(self, _: object) -> None:
-        again, self._again = self._again, False
-        if again:
+    def _receive(self, answers: _Answers) -> None:
+        for start, shares in answers.pieces:
+            self.shares[start : start + len(shares)] = shares
+            self.done[start : start + len(shares)] = True
+        self._reached = answers.reached
+        if self._asked != self._revision:
             self._go_on()
         elif self._key is not None and self.done.all():
             self._results.put(self._key, self.shares.copy(), self.shares.nbytes)
@@ -324,23 +260,34 @@ class ClassTrack(BackgroundModel):
         self.changed.emit()
 
 
-def _in_order(
+def _answers(
     classifier: RemoteClassifier,
     doppler: DopplerMap,
-    stretch: tuple[int, int],
+    known: NDArray[np.bool_],
+    waiting: NDArray[np.intp],
     grows: bool,
-    going: _Going | None,
-    emit: Emit,
-) -> None:
-    """Classify one stretch piece by piece from where it was left; ``grows``: no end yet."""
-    start, stop = stretch
-    if going is None or going.start != start or going.next > stop:
-        going = _Going(classifier.live(), start, start, start)
-    while going.next < stop:
-        end = min(going.next + _AT_ONCE, stop)
-        shares = going.session.advance(np.ascontiguousarray(doppler.values[:, going.next : end].T))
-        answered = going.answered
-        going = _Going(going.session, start, end, answered + len(shares))
-        emit(_Piece(answered, shares, going))
-    if going.answered < stop and not grows:
-        emit(_Piece(going.answered, going.session.finish(), going))
+    reached: _Reached | None,
+) -> _Answers:
+    """Classify the stretches in which frames wait, those that grow from where they were left."""
+    card, pieces = classifier.card, []
+    is_open = np.append(~known, grows)  # what follows is still to come, and the last answers owed
+    inside = replace(doppler, present=doppler.present_mask & known)
+    for start, stop in stretches(inside, card.frame_rate_hz):
+        if not ((start <= waiting) & (waiting < stop)).any():
+            continue
+        if is_regular(doppler.times_s[start:stop], card.frame_rate_hz):
+            if reached is None or reached.start != start:
+                reached = _Reached(classifier.live(), start, start, start)
+            for at in range(reached.next, stop, _AT_ONCE):
+                end, (session, _, _, answered) = min(at + _AT_ONCE, stop), reached
+                shares = session.advance(np.ascontiguousarray(doppler.values[:, at:end].T))
+                pieces.append((answered, shares))
+                reached = _Reached(session, start, end, answered + len(shares))
+            if not is_open[stop]:
+                pieces.append((reached.answered, reached.session.finish()))
+        else:
+            cut = replace(cut_out(doppler, start, doppler.values[:, start:stop]), present=None)
+            owed = round(card.delay_s * cut.timebase.frames_per_s) if is_open[stop] else 0
+            shares = classifier.probabilities(cut)
+            pieces.append((start, shares[: max(len(shares) - owed, 0)]))
+    return _Answers(pieces, reached)

@@ -265,13 +265,23 @@ def test_another_frame_rate_is_asked_about_as_a_whole(set_up):
     assert set_up.track.complete
 
 
-def test_a_long_map_comes_piece_by_piece(set_up):
+def test_a_long_map_is_asked_about_piece_by_piece(set_up):
     doppler = a_map(frames=2 * _AT_ONCE + 10)
     set_up.source.set_map(doppler)
     set_up.settle()
     assert set_up.fake.sessions == 1
     assert set_up.fake.frames == 2 * _AT_ONCE + 10
     assert set_up.track.complete
+
+
+def test_stretches_with_frames_to_come_behind_them_owe_their_last_answers(late):
+    doppler, covered = a_map(), np.zeros(90, bool)
+    covered[10:40] = covered[60:] = True
+    late.source.set_map(doppler, covered)
+    late.settle()
+    assert np.flatnonzero(late.track.done).tolist() == [*range(10, 34), *range(60, 90)]
+    told = expected(doppler.values.T[60:])
+    np.testing.assert_allclose(late.track.shares[60:], told, rtol=1e-6)
 
 
 def test_a_map_of_another_axis_is_refused_in_words(set_up):
