@@ -62,7 +62,7 @@ class ClassifyModel(ReportingModel, SpanFinder):
         self._in_favour = (maps.denoised, maps.real, maps.synthetic)
         self.searched = (maps.synthetic, maps.denoised, maps.real)
         self._labels, self._library = labels, library
-        self.track = ClassTrack(denoise.is_current, session.results, self)
+        self.track = ClassTrack(denoise.is_current, self)
         # The classifier that is in use or being loaded, and the card of the one in use.
         self.path: Path | None = next(iter(self._settings.paths(_MODEL)), None)
         self.card: ClassifierCard | None = None

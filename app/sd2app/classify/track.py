@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,7 +18,6 @@ from sd2core.classify.card import ClassifierCard
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
-from sd2core.numerics.byte_budget import ByteBudget
 
 _LATE_S = 0.2
 """Largest accepted lag behind the clock while a map grows frame by frame."""
@@ -69,11 +68,9 @@ class ClassTrack(BackgroundModel):
 
     changed = Signal()  # probabilities of frames
 
-    def __init__(
-        self, counts: Callable[[MapModel], bool], results: ByteBudget, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, counts: Callable[[MapModel], bool], parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._counts, self._results = counts, results
+        self._counts = counts
         self.source: MapModel | None = None  # the map that is looked at
         self._classifier: RemoteClassifier | None = None
         self.card: ClassifierCard | None = None  # of the classifier at work
@@ -183,8 +180,7 @@ class ClassTrack(BackgroundModel):
             self._fail(error)
             return
         self._take(source.map, source.known)
-        if not self._restore():
-            self._go_on()
+        self._go_on()
 
     def _take(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> None:
         """Copy a map, which may change in place, and forget answers to what was another."""
@@ -212,21 +208,6 @@ class ClassTrack(BackgroundModel):
         self.shares, self.done = shares, done
         self.changed.emit()
 
-    @property
-    def _key(self) -> Hashable:
-        """Key of all that the answers depend on; None until the map is final."""
-        return None if self.source is None else self.source.key_with(self._classifier)
-
-    def _restore(self) -> bool:
-        """Show what the classifier answered before of the same map."""
-        kept = self._results.get(self._key)
-        if kept is None or self.done.all():
-            return False
-        self._runner.cancel()
-        self.shares[:], self.done[:], self._reached = kept, True, None
-        self.changed.emit()
-        return True
-
     # --- classifying ----------------------------------------------------------------------
 
     def _go_on(self) -> None:
@@ -248,8 +229,6 @@ class ClassTrack(BackgroundModel):
         self._reached = answers.reached
         if self._asked != self._revision:
             self._go_on()
-        elif self._key is not None and self.done.all():
-            self._results.put(self._key, self.shares.copy(), self.shares.nbytes)
         self.changed.emit()
 
     def _fail(self, error: Exception) -> None:

@@ -42,7 +42,7 @@ class Mode(QObject):
 
 
 _RESULTS_BYTES = 256 << 20
-"""For maps and classes of places that were left: some hundred minutes of maps."""
+"""For maps of places that were left: some hundred minutes."""
 
 
 @dataclass(frozen=True)

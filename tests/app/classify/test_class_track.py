@@ -14,7 +14,6 @@ from sd2app.classify.track import _AT_ONCE, ClassTrack
 from sd2app.session.maps import MapModel
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
-from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -31,7 +30,7 @@ def a_map(frames=90, seed=0, rate=RATE, **more):
 @pytest.fixture
 def set_up(qtbot):
     fake, source, state = FakeClassifiers(), MapModel("Denoised"), SimpleNamespace(counts=True)
-    track = ClassTrack(lambda _: state.counts, ByteBudget(1 << 20))
+    track = ClassTrack(lambda _: state.counts)
     track.look_at(source)
     track.use(FakeClassifier(fake, class_card("/a.safetensors")))
 
@@ -68,21 +67,6 @@ def test_levels_and_alignment_classify_nothing_anew(set_up):
     # The same frame stands a second later.
     assert set_up.track.at(0.5) is None
     assert set_up.track.at(1.0).shares == pytest.approx(expected(a_map().values.T)[0])
-
-
-def test_a_final_map_that_comes_back_is_not_classified_again(set_up):
-    set_up.source.set_map(a_map(), key="first")
-    set_up.settle()
-    answers = set_up.track.shares.copy()
-    set_up.source.set_map(a_map(seed=1), key="second")
-    set_up.settle()
-    asked = set_up.fake.frames
-    set_up.source.set_map(a_map(), key="first")
-    assert set_up.track.complete
-    np.testing.assert_array_equal(set_up.track.shares, answers)
-    set_up.source.set_map(a_map(seed=1))  # no key: it is not known to be final
-    set_up.settle()
-    assert set_up.fake.frames > asked
 
 
 def test_a_map_that_grows_is_gone_on_with(set_up):
