@@ -31,8 +31,8 @@ _ROUNDS = 5
 _JUMP, _STILL_MPS = 4.0, 0.3
 """How many times faster than around it, and than noise, a body jumps; of all trials of CMU's motion
 capture, at 30, 15 and 10 frames/s, three do so, in frames that are broken."""
-_SLOW_S = 0.11
-"""Between frames that are farther apart a body may start and stop again."""
+_AROUND_S = 0.1
+"""Around a jump, and two frames at least: stutter repeats its frames more often than that."""
 _BRIDGED_VISIBILITY = 0.25
 _NAMED = 4
 """Stretches that a note names at most."""
@@ -161,21 +161,26 @@ def find_jumps(track: RawTrack) -> NDArray[np.bool_]:
     """Frames (T,) to which the whole body jumps, as after a cut in the video.
 
     Half of the landmarks move by far more there than from frame to frame just before and after; a
-    fast limb is not half of them, and a fast body needs several frames to start and to stop. In the
-    two frames beside a gap, a jump and either end nothing is known of it.
+    fast limb is not half of them, and a fast body needs several frames to start and to stop. So
+    near a gap, and at less than 10 frames/s, nothing is known of it.
     """
     jumps = np.zeros(len(track.times_s), bool)
     rows = np.flatnonzero(track.present)
-    if len(rows) < 6:
+    if len(rows) < 2:
         return jumps
+    from scipy.ndimage import maximum_filter
+
     scale = pixels_per_metre(track)[rows, None]
     places = np.stack([place_m(track, rows, scale, n) for n in range(len(LANDMARKS))])  # (33, N, 5)
-    step_s = np.diff(track.times_s[rows])
     moved_m = np.median(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=0)  # (N - 1,)
-    known = (np.diff(rows) == 1) & (step_s < _SLOW_S)
-    speed_mps = np.pad(np.where(known, moved_m / step_s, np.inf), 2, constant_values=np.inf)
-    around = np.lib.stride_tricks.sliding_window_view(speed_mps, 5)[:, [0, 1, 3, 4]].max(axis=1)
-    jumps[rows[1:]] = known & (speed_mps[2:-2] > _JUMP * np.maximum(around, _STILL_MPS))
+    step_s = np.diff(track.times_s[rows])
+    known = (np.diff(rows) == 1) & (step_s < 1.1 * _AROUND_S)
+    beside = max(round(_AROUND_S / float(np.median(step_s))), 2)
+    speed_mps = np.where(known, moved_m / step_s, np.inf)
+    window = np.ones(2 * beside + 1, bool)
+    window[beside] = False
+    around_mps = maximum_filter(speed_mps, footprint=window, mode="constant", cval=np.inf)
+    jumps[rows[1:]] = known & (speed_mps > _JUMP * np.maximum(around_mps, _STILL_MPS))
     return jumps
 
 

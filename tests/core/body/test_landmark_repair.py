@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -220,7 +221,7 @@ class TestJumps:
     @settings(max_examples=20, deadline=None)
     @given(
         rate_hz=st.sampled_from([10.0, 15.0, 25.0, 30.0, 60.0]),
-        cut=st.integers(3, 26),
+        cut=st.integers(7, 22),
         aside_m=st.floats(0.3, 2.0),
     )
     def test_a_cut_is_left_empty_and_said(self, rate_hz: float, cut: int, aside_m: float) -> None:
@@ -248,6 +249,11 @@ class TestJumps:
         points[..., 0] += far_m * minimum_jerk((times - begin_s) / duration_s)[:, None]
         points += np.random.default_rng(1).normal(0.0, noise_m, points.shape)
         assert not find_jumps(found_from(points, times)).any()
+
+    def test_nor_are_frames_that_stand_still_in_between(self) -> None:
+        times = np.arange(0.0, 1.0, 1.0 / 120.0)
+        found = waving(np.floor(15.0 * times) / 15.0)
+        assert not find_jumps(replace(found, times_s=times)).any()
 
     def test_nor_is_a_limb_that_is_seen_elsewhere_at_once(self) -> None:
         found = waving(np.arange(30) / 30.0)
