@@ -115,6 +115,8 @@ class Beam:
     '56° × 28°'
     """
 
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
+
     azimuth_width_deg: float
     elevation_width_deg: float
     cuts: tuple[tuple[float, float, float], ...] = ()

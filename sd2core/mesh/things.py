@@ -93,6 +93,8 @@ class Thing:
     'screen at x 0.3, y 0.9, z 1.2 m, 0.6 × 1.8 × 0.03 m'
     """
 
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
+
     shape: str
     position_m: Vector
     turn_deg: float = 0.0

@@ -55,6 +55,8 @@ class Wall:
     'floor at 1.1 m, 8.2 dB'
     """
 
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
+
     distance_m: float
     azimuth_deg: float = 0.0
     elevation_deg: float = 0.0

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sd2core.errors import Sd2Error
-from sd2core.files.recording_json import BeamEntry
-from sd2core.files.texts import faults_in
+from sd2core.files.texts import errors_in, faults_in
 from sd2core.options.bounds import (
     COORDINATE_M,
     COUNT,
@@ -29,6 +28,7 @@ from sd2core.options.bounds import (
     Bounds,
 )
 from sd2core.options.kinds import MapKind
+from sd2core.sensor import Beam
 
 _MANY = 65_536
 _DAMAGED = "Copy it again from where it came, or write it again"
@@ -51,7 +51,7 @@ class SensorMeta(_Record):
     position_m: Annotated[list[Annotated[float, COORDINATE_M]], Field(min_length=3, max_length=3)]
     azimuth_deg: _Number = 0.0
     elevation_deg: _Number = 0.0
-    beam: BeamEntry | None = None
+    beam: Beam | None = None
 
 
 class _Plan(_Record):
@@ -137,7 +137,8 @@ def check_record(kind: type[BaseModel], content: Any, place: str | Path) -> None
     place : str or Path
         Where it stands, for the error.
     """
-    with faults_in(place, "a description as it was written", _DAMAGED):
+    what = "a description as it was written"
+    with errors_in(place, _DAMAGED), faults_in(place, what, _DAMAGED):
         kind.model_validate(content)
 
 

@@ -12,8 +12,8 @@ from pydantic import BaseModel
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
-from sd2core.files.recording_json import Document
 from sd2core.recording.divergence import WORDS, named
+from sd2core.recording.document import Document
 from sd2core.recording.recording import Recording, settings_of
 
 _ALWAYS = ("sensor", "placements", "radar_offset_s")

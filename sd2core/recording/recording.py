@@ -28,19 +28,7 @@ from sd2core.files.paths import (
     remove,
     stored_path,
 )
-from sd2core.files.recording_json import (
-    FILE_NAME,
-    VERSION,
-    BodyEntry,
-    CameraEntry,
-    Document,
-    MeshReading,
-    SensorEntry,
-    Span,
-    ThingEntry,
-    WallEntry,
-    read_document,
-)
+from sd2core.files.recording_json import FILE_NAME, CameraEntry, MeshReading, Span
 from sd2core.files.resources import resource_path
 from sd2core.files.texts import errors_in, faults_in
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
@@ -52,6 +40,7 @@ from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.plausibility.clock import judge_assumed_rate
 from sd2core.progress import Progress, silent
 from sd2core.recording.divergence import WORDS, Divergence, State, digests_of
+from sd2core.recording.document import VERSION, Document, read_document
 from sd2core.recording.relinking import (
     ROLES,
     Relinked,
@@ -79,7 +68,7 @@ if TYPE_CHECKING:
 SUFFIX = ".sd2"
 
 _AS_THEY_ARE = (
-    *("title", "subject", "simulated", "camera", "mesh_reading", "bundled_denoiser"),
+    *("title", "subject", "simulated", "camera", "mesh_reading", "bundled_denoiser", "walls"),
     *("radar_receiver", "radar_transmitter", "radar_offset_s", "imu_places", "imu_offset_s"),
 )
 """Settings that ``recording.json`` holds as a recording does."""
@@ -267,8 +256,7 @@ class Recording:
                 self,
                 folder=folder,
                 **{role: path for role, path in files.items() if role in ROLES},  # type: ignore[arg-type]
-                things=_with_files(self.things, files.get),
-                bodies=_with_paths(self.bodies, files.get),
+                **_with_files(self.things, self.bodies, files.get),
                 title=self.title or folder.stem,
                 labels_elsewhere=False,
                 _base=None,
@@ -349,10 +337,10 @@ class Recording:
         See :func:`~sd2core.recording.relinking.find_again`.
         """
         relinked = find_again(self.missing(), Path(folder), progress)
-        for role in relinked.paths.keys() & set(ROLES):
-            setattr(self, role, relinked.paths[role])
-        self.bodies = _with_paths(self.bodies, relinked.paths.get)
-        self.things = _with_files(self.things, relinked.paths.get)
+        found = {role: path for role, path in relinked.paths.items() if role in ROLES}
+        scene = _with_files(self.things, self.bodies, relinked.paths.get)
+        for name, value in (found | scene).items():
+            setattr(self, name, value)
         return relinked
 
     def save(self, timebase: Timebase | None = None) -> None:
@@ -392,21 +380,21 @@ class Recording:
             return stored_path(Path(path), self.folder)
 
         document = self._read.model_copy(deep=True)
-        document.version = VERSION
-        with faults_in(self.folder, "what docs/formats.md says of a recording"):
-            for name in _AS_THEY_ARE:
-                setattr(document, name, getattr(self, name))
-        document.placements = None if self.placements is None else self.placements.as_dict()
-        things, bodies = _with_files(self.things, stored), _with_paths(self.bodies, stored)
-        document.things = tuple(ThingEntry.model_validate(asdict(one)) for one in things)
-        document.bodies = tuple(BodyEntry.model_validate(asdict(one)) for one in bodies)
-        document.walls = tuple(WallEntry.model_validate(asdict(one)) for one in self.walls)
-        document.spans = () if self._writes_labels else tuple(self.spans)
-        stated = {"beam": None} | self.sensor.as_dict()
-        document.sensor = SensorEntry.model_validate(document.sensor.model_dump() | stated)
+        scene = _with_files(self.things, self.bodies, stored)
+        settings = {name: getattr(self, name) for name in _AS_THEY_ARE} | {
+            "version": VERSION,
+            "sensor": document.sensor.model_dump() | {"beam": None} | self.sensor.as_dict(),
+            "placements": None if self.placements is None else self.placements.as_dict(),
+            **scene,
+            "bodies": [asdict(one) for one in scene["bodies"]],
+            "spans": () if self._writes_labels else self.spans,
+        }
         for role in ROLES:
             path = getattr(self, role)
-            setattr(document, role, None if path is None else stored(role, path))
+            settings[role] = None if path is None else stored(role, path)
+        with faults_in(self.folder, "what docs/formats.md says of a recording"):
+            for name, value in settings.items():
+                setattr(document, name, value)
         return document
 
     @property
@@ -669,51 +657,45 @@ def open_recording(path: Path) -> Recording:
 def settings_of(document: Document, folder: Path) -> dict[str, Any]:
     """Fields of a recording by their names, but for labels, as its file holds them.
 
-    Raises Sd2Error where the sensor, the placements, a thing, a body or a wall cannot be.
+    Raises Sd2Error where the sensor, the placements or a body cannot be.
     """
 
     def located(_: Role, path: str | None) -> Path | None:
         return located_path(path, folder)
 
     planned = document.placements
+    bodies = [
+        Body(**one.model_dump(exclude={"reading"}), reading=one.reading.options())
+        for one in document.bodies
+    ]
     return {
         **{name: getattr(document, name) for name in _AS_THEY_ARE},
         **{role: located(role, getattr(document, role)) for role in ROLES},
         "imu_places": tuple(dict.fromkeys(document.imu_places)),
         "sensor": VirtualSensor.from_dict(document.sensor.model_dump()),
         "placements": None if planned is None else placements_from_dict(planned),
-        "things": _with_files((Thing(**one.model_dump()) for one in document.things), located),
-        "bodies": _with_paths(
-            (
-                Body(**one.model_dump(exclude={"reading"}), reading=one.reading.options())
-                for one in document.bodies
-            ),
-            located,
-        ),
-        "walls": tuple(Wall(**entry.model_dump()) for entry in document.walls),
+        **_with_files(document.things, bodies, located),
     }
 
 
-def _with_paths(bodies: Iterable[Body], path_of: Callable[[Role, str], object]) -> tuple[Body, ...]:
-    """Copies of bodies with other paths of their files."""
-    return tuple(
-        replace(
-            one,
-            path=str(path_of(body_role(index), one.path)),
-            faces=None if one.faces is None else str(path_of(faces_role(index), one.faces)),
-        )
-        for index, one in enumerate(bodies)
-    )
-
-
 def _with_files(
-    things: Iterable[Thing], path_of: Callable[[Role, str], object]
-) -> tuple[Thing, ...]:
-    """Copies of things with other paths of their mesh files."""
-    return tuple(
-        replace(one, shape=str(path_of(thing_role(number), one.shape))) if one.is_file else one
-        for number, one in enumerate(things, start=1)
-    )
+    things: Iterable[Thing], bodies: Iterable[Body], path_of: Callable[[Role, str], object]
+) -> dict[str, Any]:
+    """Things and bodies of a recording with other paths of their files."""
+    return {
+        "things": tuple(
+            replace(one, shape=str(path_of(thing_role(number), one.shape))) if one.is_file else one
+            for number, one in enumerate(things, start=1)
+        ),
+        "bodies": tuple(
+            replace(
+                one,
+                path=str(path_of(body_role(index), one.path)),
+                faces=None if one.faces is None else str(path_of(faces_role(index), one.faces)),
+            )
+            for index, one in enumerate(bodies)
+        ),
+    }
 
 
 def open_sample() -> Recording:

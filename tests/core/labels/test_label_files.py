@@ -15,7 +15,6 @@ from labelled import even, imported, uneven
 
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import Span as InlineSpan
-from sd2core.files.recording_json import read_document
 from sd2core.files.resources import resource_path
 from sd2core.labels.files import (
     FILE_NAME,
@@ -28,6 +27,7 @@ from sd2core.labels.files import (
 )
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.spans import ORIGINS, Labels, LabelTrack, Span
+from sd2core.recording.document import read_document
 from sd2core.timebase import Timebase
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=9)

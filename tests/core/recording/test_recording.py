@@ -15,7 +15,6 @@ from numbered_videos import write_video
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_absolute, located_path, stored_path
-from sd2core.files.recording_json import Document
 from sd2core.labels.files import write_labels
 from sd2core.labels.spans import Labels
 from sd2core.labels.spans import Span as LabelSpan
@@ -23,6 +22,7 @@ from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
+from sd2core.recording.document import Document
 from sd2core.recording.recording import (
     FILE_NAME,
     VERSION,
