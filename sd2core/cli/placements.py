@@ -94,7 +94,7 @@ def _placements(options: Placing) -> Report:
       sd2 placements walk.sd2 --cloud 200 --ranges 1:4 --azimuths -60:60 --elevations -10:40
       sd2 placements walk.sd2 --placements grid.json --json
     """
-    from sd2core.cli.reading import load_mesh_from_options, open_recording_from_options
+    from sd2core.cli.reading import load_mesh_from_options, mesh_of, open_recording_from_options
     from sd2core.placements.body_extent import BodyExtent
     from sd2core.placements.placements import write_placements
     from sd2core.recording.recording import is_recording
@@ -106,8 +106,7 @@ def _placements(options: Placing) -> Report:
     if recording is None:
         mesh = load_mesh_from_options(options.mesh, options)
     else:
-        with progress_bar("Reading the mesh") as progress:
-            mesh = recording.load_mesh(progress)
+        mesh = mesh_of(recording, options)
     body = BodyExtent.of(mesh)
     beam = None if recording is None else recording.sensor.beam
     sensors = placements.sensors(body.target_m, beam)

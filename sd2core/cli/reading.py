@@ -79,22 +79,21 @@ def looking(
 
 def mesh_and_its_sensor(options: MeshInput) -> tuple[MeshSequence, VirtualSensor]:
     """Mesh, and sensor of the recording or the camera."""
-    from sd2core.recording.recording import is_recording, open_recording
+    from sd2core.recording.recording import is_recording
     from sd2core.sensor import VirtualSensor
 
-    sensor = VirtualSensor()
-    if is_recording(options.mesh):
-        recording = open_recording(options.mesh)
-        whom = options.person if recording.bodies else None
-        read = options if whom is None else replace(options, person=None)
-        _read_mesh_as_told(recording, options.mesh, read)
-        sensor = recording.sensor
-        with progress_bar("Reading the mesh") as progress:
-            mesh = recording.load_mesh(progress)
-        mesh = mesh if whom is None else mesh.body(whom)
-    else:
-        mesh = load_mesh_from_options(options.mesh, options)
-    return mesh, sensor
+    if not is_recording(options.mesh):
+        return load_mesh_from_options(options.mesh, options), VirtualSensor()
+    recording = open_recording_from_options(options.mesh, options)
+    return mesh_of(recording, options), recording.sensor
+
+
+def mesh_of(recording: Recording, options: MeshReading) -> MeshSequence:
+    """Read a recording's mesh: everybody, or who is named of several."""
+    with progress_bar("Reading the mesh") as progress:
+        mesh = recording.load_mesh(progress)
+    whom = options.person if recording.bodies else None
+    return mesh if whom is None else mesh.body(whom)
 
 
 def open_recording_from_options(path: Path, options: MeshReading) -> Recording:
@@ -102,11 +101,8 @@ def open_recording_from_options(path: Path, options: MeshReading) -> Recording:
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(path)
-    _read_mesh_as_told(recording, path, options)
-    return recording
-
-
-def _read_mesh_as_told(recording: Recording, path: Path, options: MeshReading) -> None:
+    if recording.bodies:  # of whom one may be named
+        options = replace(options, person=None)
     refuse_unused_mesh_options(options, path, recording.mesh)
     recording.mesh_reading = recording.mesh_reading.model_copy(
         update=mesh_reading(options).options()
@@ -115,6 +111,7 @@ def _read_mesh_as_told(recording: Recording, path: Path, options: MeshReading) -
         if not options.faces.exists():
             raise Sd2Error(f"The faces file {options.faces} does not exist", "a file of triangles")
         recording.faces = options.faces
+    return recording
 
 
 def refuse_unused_mesh_options(

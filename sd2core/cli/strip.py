@@ -103,6 +103,7 @@ def _rows(source: StripSource) -> list[str]:
 def _source(options: Strip, stack: ExitStack) -> StripSource:
     from dataclasses import replace
 
+    from sd2core.cli.reading import mesh_of
     from sd2core.errors import Sd2Error
     from sd2core.figures.strip_source import StripSource
 
@@ -113,8 +114,7 @@ def _source(options: Strip, stack: ExitStack) -> StripSource:
         with progress_bar("Reading the video") as progress:
             video = stack.enter_context(recording.open_video(progress))
     if recording.mesh is not None:
-        with progress_bar("Reading the mesh") as progress:
-            mesh = recording.load_mesh(progress)
+        mesh = mesh_of(recording, options)
     if video is None and mesh is None:
         raise Sd2Error(f"{options.paths[0]} has neither video nor mesh", "one of them, or both")
     source = StripSource.of(recording, video, mesh, str(options.paths[0]))

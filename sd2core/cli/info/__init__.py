@@ -85,7 +85,8 @@ def describe(path: Path, options: MeshReading) -> Report:
     kind = kind_of(path)
     if kind == "recording":
         recording = open_recording_from_options(path, options)
-        return describe_recording(recording, describe_parts(recording))
+        whom = options.person if recording.bodies else None
+        return describe_recording(recording, describe_parts(recording, whom))
     if kind == "mesh":
         return describe_mesh(path, load_mesh_from_options(path, options))
     refuse_unused_mesh_options(options, path, None)

@@ -76,8 +76,11 @@ def describe_recording(recording: Recording, parts: list[Report]) -> Report:
     return Report(f"Recording {recording.folder}", data, facts, notes, parts)
 
 
-def describe_parts(recording: Recording) -> list[Report]:
-    """Open and describe each file of a recording, as far as it is there."""
+def describe_parts(recording: Recording, person: str | None = None) -> list[Report]:
+    """Open and describe each file of a recording, as far as it is there.
+
+    Of a scene of several the mesh is that of everybody, or of the person who is named.
+    """
     missing = recording.missing()
     parts: list[Report] = []
     if recording.video is not None and "video" not in missing:
@@ -87,6 +90,7 @@ def describe_parts(recording: Recording) -> list[Report]:
         things, bodies = recording.things_there, recording.bodies_there
         with progress_bar("Reading the mesh") as progress:
             mesh = replace(recording, things=things, bodies=bodies).load_mesh(progress)
+        mesh = mesh if person is None else mesh.body(person)
         parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
         parts.append(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from cli_outcome import Sd2
+from scenes_of_people import scene
 
 from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
 from sd2core.recording.recording import Recording, open_recording
@@ -110,3 +111,21 @@ def test_places_are_those_of_the_library(sd2: Sd2, plate: Path) -> None:
     }
     grid = PlacementGrid((1.0, 2.0), (0.0,), (0.0, 90.0)).places()
     assert listed == {(one.range_m, one.azimuth_deg, one.elevation_deg) for one in grid}
+
+
+def test_they_are_around_the_person_who_is_named(sd2: Sd2, tmp_path: Path) -> None:
+    scene(tmp_path / "two.sd2")
+    targets_m = {}
+    for name in ("anna", "bert"):
+        outcome = sd2("placements", tmp_path / "two.sd2", "--ranges", 2, "--person", name, "--json")
+        targets_m[name] = json.loads(outcome.out)["target_m"]
+    # Bert is 1 m to the right.
+    assert targets_m["bert"][0] - targets_m["anna"][0] == pytest.approx(1.0, abs=0.05)
+    for command in (
+        ("placements", "--ranges", 2),
+        ("info",),
+        ("strip", "--out", tmp_path / "a.png"),
+    ):
+        refused = sd2(command[0], tmp_path / "two.sd2", "--person", "carl", *command[1:])
+        assert refused.code == 1
+        assert "shows anna and bert, not carl" in refused.err
