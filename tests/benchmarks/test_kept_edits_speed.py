@@ -37,7 +37,7 @@ def test_an_edit_in_the_window(
         c.span.set_extent(frames.start_s, frames.end_s)
         c.document.recording.labels = many_spans(SPANS)
         c.labels.open(c.document.labels)
-        keep = c.label_session.keep
+        keep = c.label_session._keep
 
         def timed(*what: Any) -> None:
             before_s = time.perf_counter()
@@ -46,7 +46,7 @@ def test_an_edit_in_the_window(
             kept_ms.append(1e3 * (now_s - before_s))
             on_disk_ms.append(1e3 * (now_s - begun_s[0]))
 
-        monkeypatch.setattr(c.label_session, "keep", timed)
+        monkeypatch.setattr(c.label_session, "_keep", timed)
 
         def edit() -> None:
             before_s = time.process_time()

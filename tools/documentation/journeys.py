@@ -87,8 +87,8 @@ window, models, library, disk
 1 sd2app/labels/edits.py LabelMarking.mark: begins; pressed again, ends
 1 sd2app/labels/edits.py LabelEdits.apply: refused where read-only
 2 sd2core/labels/edits.py Edits.create: old labels to new ones, pure
-1 sd2app/labels/edits.py LabelEdits.make: a step of the undo history
-1 sd2app/labels/autosave.py LabelAutosave.keep: before it is shown
+1 sd2app/session/undo.py Edits.set_labels: a step of the undo history
+1 sd2app/labels/autosave.py LabelAutosave._follow_history: before it is shown
 3 sd2core/labels/journal.py Journal.write: a record, flushed to disk
 1 sd2app/labels/model.py LabelsModel.set_labels: changed: all views redraw
 - 0 sd2app/shell/files.py FilesFeature.save: Ctrl+S

@@ -15,6 +15,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.files.edit_lock import HEARTBEAT_EVERY_S, edit_lock
+from sd2core.labels.comparison import changed_stretch
 from sd2core.labels.journal import Journal
 from sd2core.labels.recovery import Recoverable, Recoveries, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
@@ -28,11 +29,13 @@ class LabelAutosave(QObject):
     """Edits of one recording in this window, from opening to closing.
 
     One window edits the labels; another is read-only and says why. A journal begins with the first
-    edit, of labels or of what :mod:`sd2core.recording.edited` names.
-    ``root`` is the recovery folder, shared by all windows.
+    step of the history that edits labels or what :mod:`sd2core.recording.edited` names; every step,
+    and every one back, is on disk before its labels are shown. ``done_at`` then has the earliest
+    start and latest end of changed spans. ``root`` is the recovery folder, shared by all windows.
     """
 
     changed = Signal()  # read-only state, offers or notes
+    done_at = Signal(float, float)
     noted = Signal(str)
     failed = Signal(str)
 
@@ -48,7 +51,7 @@ class LabelAutosave(QObject):
         self._offers: tuple[Recoverable, ...] = ()
         self._wanted: Recoverable | None = None
         self._recording: Recording | None = None  # the one that the history is of
-        self._others: dict[str, Any] = {}  # its other fields, as they are saved or kept
+        self._kept: tuple[Labels, dict[str, Any]] = Labels(), {}  # with other fields, or saved
         self._step = 0  # of the history
         self.notes: tuple[str, ...] = ()  # on unreadable sessions, or edits that are not kept
         self.waiting = Recoveries()  # at the start, until a recording is open
@@ -56,7 +59,7 @@ class LabelAutosave(QObject):
         heartbeat.timeout.connect(lambda: self._place is not None and self._place.heartbeat())
         heartbeat.start(round(HEARTBEAT_EVERY_S * 1000))
         document.saved.connect(self._follow_saving)
-        document.undo_stack.indexChanged.connect(self._keep_others)
+        document.undo_stack.indexChanged.connect(self._follow_history)
 
     @property
     def refusal(self) -> str:
@@ -81,7 +84,6 @@ class LabelAutosave(QObject):
         if recording is not None and not self._document.same_recording:
             self.close()
             self.waiting = Recoveries()
-            self._others = edited_fields(recording)
             self._begin(reread=True)
         elif recording is not None and self._is_elsewhere:
             self._move(recording)
@@ -126,8 +128,8 @@ class LabelAutosave(QObject):
         if not taken:
             return  # another window has that name: the one before goes on
         journal, before = self._journal, self._place
-        self._journal, self._place, self._others = None, place, edited_fields(recording)
-        self.keep("Files", Labels(), self._document.labels, self._others)
+        self._journal, self._place, self._kept = None, place, (Labels(), {})
+        self._keep("Files", recording)
         if journal is not None:
             with suppress(OSError):
                 journal.close()
@@ -157,6 +159,7 @@ class LabelAutosave(QObject):
             place.release()
             self._refusal = str(error)
         recording.labels_elsewhere = bool(self._refusal)
+        self._kept = self._document.labels, edited_fields(recording)
         if place.held:
             self._look_for_offers(place)
         self.changed.emit()
@@ -165,7 +168,8 @@ class LabelAutosave(QObject):
         recording = self._document.recording
         if recording is None:
             return
-        self._recording, self._others = recording, edited_fields(recording)
+        self._recording = recording
+        self._kept = self._document.labels, edited_fields(recording)
         if self._is_elsewhere:
             self.close()
             self._begin(reread=False)
@@ -176,30 +180,32 @@ class LabelAutosave(QObject):
 
     # --- every edit -----------------------------------------------------------------------
 
-    def _keep_others(self, step: int) -> None:
-        """Write an edit of anything else to disk, once it is in the history."""
+    def _follow_history(self, step: int) -> None:
+        """Write a step to disk, then show its labels."""
         recording, stack = self._document.recording, self._document.undo_stack
         back, self._step = step < self._step, step
         # The history of the recording before is cleared when another one is there already.
         if recording is None or recording is not self._recording:
             return
-        others = edited_fields(recording)
-        if others != self._others:
-            self._others = others
-            name = f"Undo {stack.redoText().lower()}" if back else stack.undoText()
-            self.keep(name, self._labels.labels, self._labels.labels, others)
+        self._keep(f"Undo {stack.redoText().lower()}" if back else stack.undoText(), recording)
+        before, labels = self._labels.labels, self._document.labels
+        if labels != before:
+            self._labels.set_labels(labels)
+            if (stretch := changed_stretch(before, labels)) is not None:
+                self.done_at.emit(*stretch)
 
-    def keep(
-        self, name: str, before: Labels, after: Labels, others: dict[str, Any] | None = None
-    ) -> None:
-        """Write an edit to disk before it is shown; report a failure."""
-        place = self._place
+    def _keep(self, name: str, recording: Recording) -> None:
+        """Write what differs from what was written last; report a failure."""
+        place, before = self._place, self._kept
+        self._kept = labels, others = self._document.labels, edited_fields(recording)
+        if self._kept == before:
+            return
         try:
             if place is None or not place.take():
                 return
             if self._journal is None:
-                self._journal = place.begin(before)
-            self._journal.write(name, after, others)
+                self._journal = place.begin(before[0])
+            self._journal.write(name, labels, None if others == before[1] else others)
         except OSError as error:
             self._tell_unkept(error)
         else:
@@ -281,7 +287,7 @@ class LabelAutosave(QObject):
             self._tell_unkept(error)
         else:
             self._go_on_in(journal)
-            self._others = offer.others or self._others
+            self._kept = offer.labels, offer.others or self._kept[1]
         self.postpone()
         return offer.labels
 

@@ -88,7 +88,7 @@ class LabelDragging(QObject):
         """End the drag, as one step in the history."""
         before, self._before = self._before, None
         if before is not None and self._dragged is not None:
-            self._edits.make(self._dragged, before.labels)
+            self._edits.make(self._dragged)
         self._dragged = None
         self.changed.emit()
 

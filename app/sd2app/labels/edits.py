@@ -10,11 +10,10 @@ from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.model import LabelsModel, Mark
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.undo import Assign
+from sd2app.session.undo import Edits as History
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits, field_edits
-from sd2core.labels.comparison import changed_stretch
 from sd2core.labels.edits import Change, Edit, Edits, Side
 from sd2core.labels.free_time import LONGEST_REACTION_S, LabelledFrames, NoRoom
 from sd2core.labels.spans import Labels, Span
@@ -30,17 +29,13 @@ class LabelEdits(QObject):
     (:class:`sd2app.labels.edits.LabelMarking`) also end here. Each edit is on disk when it is
     made (see :class:`sd2app.labels.autosave.LabelAutosave`). Times are frames of the clock.
     An impossible edit changes nothing, and ``failed`` says why, or ``had_no_room`` where other
-    spans are in the way. ``applying`` is emitted before an
-    edit, so that a drag in progress ends first; ``done_at`` after an edit, an undo or a redo, with
-    the earliest start and latest end of changed spans; ``restoring`` with the other fields of the
-    recording that are restored, or taken over, with the labels in the same step.
+    spans are in the way. ``applying`` is emitted before an edit, so that a drag in progress ends
+    first.
     """
 
     failed = Signal(str)
     had_no_room = Signal(str)
     applying = Signal()
-    restoring = Signal(dict)
-    done_at = Signal(float, float)
 
     def __init__(
         self,
@@ -48,12 +43,13 @@ class LabelEdits(QObject):
         labels: LabelsModel,
         playback: PlaybackModel,
         session: LabelAutosave,
+        history: History,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self.labels, self.playback = labels, playback
         self.undo_stack = document.undo_stack
-        self._document, self._session = document, session
+        self._document, self._session, self._history = document, session, history
         document.renamed.connect(self._rename)
 
     @property
@@ -157,11 +153,8 @@ class LabelEdits(QObject):
             except Sd2Error as error:
                 self.failed.emit(str(error))
         self.applying.emit()
-        before, first = self.labels.labels, recording.labels is None
-        recording.labels = self._session.take_offer()  # on disk already, as a session of its own
-        self.labels.set_labels(recording.labels)
-        name = "Restore edits" if others else "Restore labels"
-        self._make_with(name, before, recording.labels, others, first)
+        labels = self._session.take_offer()  # on disk already, as a session of its own
+        self._make_with("Restore edits" if others else "Restore labels", labels, others)
 
     def take_state(self, name: str, state: State) -> None:
         """Take over labels and settings that were saved elsewhere, as one step."""
@@ -169,20 +162,16 @@ class LabelEdits(QObject):
         if recording is None:
             return
         self.applying.emit()
-        before, now = self.labels.labels, recording.state()
-        after = before if state.labels == now.labels else state.labels
+        now = recording.state()
         others = {one: value for one, value in state.settings.items() if value != now.settings[one]}
-        if others or after is not before:
-            self._make_with(name, before, after, others)
+        if others or state.labels != now.labels:
+            self._make_with(name, state.labels, others)
 
-    def _make_with(
-        self, name: str, before: Labels, after: Labels, others: dict[str, Any], first: bool = False
-    ) -> None:
+    def _make_with(self, name: str, labels: Labels, others: dict[str, Any]) -> None:
         """Make one step of an edit of labels and of other fields."""
         self.undo_stack.beginMacro(name)
-        self.make(Edit(name, after), before, first=first)
-        if others:
-            self.restoring.emit(others)
+        self._history.set_labels(name, labels)
+        self._history.restore(others)
         self.undo_stack.endMacro()
 
     # --- finding one's way ----------------------------------------------------------------
@@ -219,16 +208,15 @@ class LabelEdits(QObject):
         if self.refused():
             return False
         self.applying.emit()
-        before = self.labels.labels
         try:
-            done = change(Edits(before, self.playback.timebase))
+            done = change(Edits(self.labels.labels, self.playback.timebase))
         except NoRoom as error:
             self.had_no_room.emit(str(error))
             return False
         except Sd2Error as error:
             self.failed.emit(str(error))
             return False
-        self.make(done, before)
+        self.make(done)
         return True
 
     def refused(self) -> bool:
@@ -237,34 +225,11 @@ class LabelEdits(QObject):
             self.failed.emit(self.refusal)
         return bool(self.refusal)
 
-    def make(self, done: Edit, before: Labels, *, first: bool = False) -> None:
-        """Apply a computed edit as one step in the history.
-
-        ``first`` of a recording that was not labelled before, and is not once it is undone.
-        """
-        if done.labels is not before:
-            recording = self._document.recording
-            first = first or (recording is not None and recording.labels is None)
-            forward = done.name, before, done.labels, False
-            back = f"Undo {done.name.lower()}", done.labels, before, first
-            step = Assign(done.name, lambda change: self._become(*change), back, forward)
-            step.redo()
-            self.undo_stack.push(step)
+    def make(self, done: Edit) -> None:
+        """Apply a computed edit as one step in the history."""
+        self._history.set_labels(done.name, done.labels)
         if done.ids:
             self.labels.select(done.ids)
-
-    def _become(self, name: str, before: Labels, after: Labels, unlabel: bool) -> None:
-        """Change the labels: the only place that does, on disk first, then on screen."""
-        recording = self._document.recording
-        if recording is None or recording.labels is after:
-            return
-        self._session.keep(name, before, after)
-        recording.labels = after
-        if unlabel:
-            recording.unlabel()
-        self.labels.set_labels(after)
-        if (stretch := changed_stretch(before, after)) is not None:
-            self.done_at.emit(*stretch)
 
 
 LONGEST_MS = round(1000 * LONGEST_REACTION_S)

@@ -49,7 +49,7 @@ class LabelsFeature(Feature):
         self.model = labels = LabelsModel(session.parent)
         self.autosave = LabelAutosave(session.document, labels, recovery, session.parent)
         self.edits = LabelEdits(
-            session.document, labels, session.playback, self.autosave, session.parent
+            session.document, labels, session.playback, self.autosave, session.edits, session.parent
         )
         self.dragging = LabelDragging(self.edits, session.parent)
         self.marking = LabelMarking(self.edits, session.settings)
@@ -57,9 +57,8 @@ class LabelsFeature(Feature):
         self.loop = SpanLoop(labels, session.playback, session.parent)
         self.over_maps, self.over_all = map_overlay(labels), strip_overlay(labels)
         self.cut_out = CutOutModel(session, synthesis, session.parent)
-        self.edits.done_at.connect(session.span.reveal_any)
+        self.autosave.done_at.connect(session.span.reveal_any)
         self.edits.failed.connect(shell.warn)
-        self.edits.restoring.connect(session.edits.restore)
         report(shell, self.autosave, self.cut_out)
         session.document.changed.connect(self._follow_capture)
         shown = labels.changed, labels.selection_changed, labels.marks_changed

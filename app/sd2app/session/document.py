@@ -417,6 +417,14 @@ class DocumentModel(BackgroundModel):
         if _channel(recording) != channel:
             self._process_capture()
 
+    def set_labels(self, labels: Labels | None) -> None:
+        """Give the recording labels of its own, or none unless such were saved; tells nobody."""
+        if (recording := self.recording) is not None:
+            recording.labels = labels
+            if labels is None:
+                recording.labels = self.labels
+                recording.unlabel()
+
     def _exchange_mesh(self, read: ReadMesh) -> None:
         """Show another mesh in what is open; the history and all else stay."""
         content = self.content

@@ -15,6 +15,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.maps import MapModel
 from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
+from sd2core.labels.spans import Labels
 from sd2core.mesh.bodies import Body, renamed
 from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
@@ -218,6 +219,14 @@ class Edits:
         if recording is not None:
             name = {Thing: "things", Body: "bodies", Wall: "walls"}[type(one)]
             self.change(f"{text} {one.name}", {name: change(getattr(recording, name))})
+
+    # --- labels ---------------------------------------------------------------------------
+
+    def set_labels(self, text: str, labels: Labels) -> None:
+        """Label the recording otherwise; undone, it has no labels of its own where it had none."""
+        recording = self._document.recording
+        if recording is not None and labels != self._document.labels:
+            self._push(text, self._document.set_labels, recording.labels, labels)
 
     # --- files ----------------------------------------------------------------------------
 

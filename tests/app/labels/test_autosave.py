@@ -40,9 +40,10 @@ class Desk:
         self.document = DocumentModel(TaskList())
         self.labels, self.playback = LabelsModel(), PlaybackModel()
         self.session = LabelAutosave(self.document, self.labels, root, self.document)
-        self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
         self.all_edits = Edits(self.document, SensorModel())
-        self.edits.restoring.connect(self.all_edits.restore)
+        self.edits = LabelEdits(
+            self.document, self.labels, self.playback, self.session, self.all_edits
+        )
         self.marking = LabelMarking(self.edits, Settings.forgetful())
         self.hand = LabelDragging(self.edits)
         self.said: list[str] = []
@@ -425,8 +426,6 @@ class TestOffers:
         at = desk().open(recording)
         assert at.session.changed_others(at.session.offer) == ["way to read the mesh"]
         np.testing.assert_allclose(at.document.mesh.frame(0), first_m)
-        others = Edits(at.document, SensorModel())
-        at.edits.restoring.connect(others.restore)
         with qtbot.waitSignal(at.document.opened, timeout=10_000):
             at.edits.restore()
         np.testing.assert_allclose(at.document.mesh.frame(0), first_m * [-1, -1, 1], atol=1e-6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from label_edits import label_edits
+from label_edits import label_edits, show_labels
 from PySide6.QtTest import QAbstractItemModelTester
 
 from sd2app.labels.label_set_model import (
@@ -32,18 +32,19 @@ class Edited:
 
     def __init__(self) -> None:
         edits = label_edits(Timebase.regular(100, 10.0))
-        self.labels, self.refused = edits.labels, []
+        self.edits, self.labels, self.refused = edits, edits.labels, []
         edits.failed.connect(self.refused.append)
         keys = KeyBindings([Named()], self.labels, Settings.forgetful(), self.labels)
         self.model = LabelSetModel(edits, keys)
-        self.labels.open(
+        show_labels(
+            edits,
             Labels(
                 (LabelTrack("Gestures"),),
                 (
                     Span(1, "Gestures", 1.0, 2.0, "up-to-down"),
                     Span(2, "Gestures", 3.0, 4.0, "up-to-down"),
                 ),
-            )
+            ),
         )
         self.model.set_watched(True)
 
@@ -117,7 +118,9 @@ def test_labels_are_put_in_another_order_and_removed(edited) -> None:
     assert edited.cell(1, NAME) == "up-to-down"
     assert edited.model.remove(1)
     assert edited.labels.labels.spans[0].label == "up-to-down"
-    edited.labels.open(edited.labels.labels.with_spans([Span(3, "Gestures", 5, 6, "background")]))
+    show_labels(
+        edited.edits, edited.labels.labels.with_spans([Span(3, "Gestures", 5, 6, "background")])
+    )
     assert edited.model.remove(3, "down-to-up")
     assert edited.labels.labels.span(3).label == "down-to-up"
 

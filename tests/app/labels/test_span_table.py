@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from label_edits import label_edits
+from label_edits import label_edits, show_labels
 from labelled import even, imported, many_spans, random_edit
 from PySide6.QtCore import QItemSelectionModel, QPersistentModelIndex, Qt
 from PySide6.QtTest import QAbstractItemModelTester
@@ -44,7 +45,8 @@ class Table:
 @pytest.fixture
 def table():
     made = Table()
-    made.labels.open(
+    show_labels(
+        made.edits,
         Labels(
             (LabelTrack("Gestures"), LabelTrack("Free", "free")),
             (
@@ -52,7 +54,7 @@ def table():
                 Span(2, "Gestures", 3.0, 5.0, "up-to-down", author="Anna"),
                 Span(3, "Free", 2.0, 2.5, "clap", note="Both hands", confidence=0.5),
             ),
-        )
+        ),
     )
     return made
 
@@ -108,7 +110,8 @@ def test_filtered_by_text_label_and_track(table) -> None:
 def test_persons_are_offered_where_there_are_several(table) -> None:
     assert table.model.choices("person") == []
     scene = SimpleNamespace(others=["anna"], persons=("anna", "person 2"))
-    table.edits._document.mesh = scene
+    document = table.edits._document
+    document.content = replace(document.content, mesh=scene)
     assert table.model.choices("person") == ["", "anna", "person 2"]
     table.labels.select([1, 2])
     assert table.type(0, "person", "anna")
@@ -116,7 +119,7 @@ def test_persons_are_offered_where_there_are_several(table) -> None:
     table.model.set_filter(SpanFilter("ANNA"))
     assert [span.id for span in table.model.rows] == [1, 2]
     # Whom the scene does not have any more is still somebody.
-    table.edits._document.mesh = None
+    document.content = replace(document.content, mesh=None)
     assert table.model.choices("person") == ["", "anna"]
     table.edits.undo_stack.undo()
     assert table.model.choices("person") == []
@@ -194,7 +197,7 @@ def test_choices_are_the_labels_of_the_set_then_others_and_the_tracks(table) -> 
 
 def test_nothing_is_made_while_nobody_looks(table) -> None:
     table.model.set_watched(False)
-    table.labels.open(many_spans(10))
+    show_labels(table.edits, many_spans(10))
     assert table.model.rowCount() == 3
     table.model.set_watched(True)
     assert table.model.rowCount() == 10
@@ -208,7 +211,7 @@ def test_rows_and_what_points_at_them_follow_any_edits(table, column: str) -> No
     tester = QAbstractItemModelTester(model, QAbstractItemModelTester.FailureReportingMode.Fatal)
     model.sort(AT[column], FALLING)
     rng = random.Random(7)
-    table.labels.open(imported(timebase, 7, 20))
+    show_labels(table.edits, imported(timebase, 7, 20))
     for _ in range(50):
         held = [(span.id, QPersistentModelIndex(model.index(row, 2)))
                 for row, span in enumerate(model.rows)]  # fmt: skip

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from label_edits import label_edits
+from label_edits import label_edits, show_labels
 
 from sd2app.labels.dragging import LabelDragging
 from sd2app.session.maps import MapModel
@@ -56,7 +56,9 @@ class KnownSpans:
 def set_up(qtbot):
     edits = label_edits(Timebase.regular(600, RATE))
     labels, playback = edits.labels, edits.playback
-    labels.open(Labels((LabelTrack("Gestures"),), (Span(1, "Gestures", 20.0, 21.0, "up-to-down"),)))
+    show_labels(
+        edits, Labels((LabelTrack("Gestures"),), (Span(1, "Gestures", 20.0, 21.0, "up-to-down"),))
+    )
     real = MapModel("Real")
     real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
     finders = MotionFinder((MapModel("Synthetic"), real)), KnownSpans(real)
@@ -192,7 +194,7 @@ def test_nothing_says_that_there_is_no_map_once_there_is_one(set_up) -> None:
     there = real.map
     real.set_map(None)
     offered = Span(5, "Gestures", 3.0, 4.0, "background", confidence=0.5, origin="suggestion")
-    set_up.labels.open(Labels((LabelTrack("Gestures"),), (offered,)))
+    show_labels(set_up.edits, Labels((LabelTrack("Gestures"),), (offered,)))
     model.open()
     assert model.text == "1 suggestion to decide on"
     model.reject()
@@ -205,7 +207,7 @@ def test_nothing_says_that_there_is_no_map_once_there_is_one(set_up) -> None:
 
 def test_suggestions_of_a_file_are_to_be_decided_on_without_looking(set_up) -> None:
     offered = Span(5, "Gestures", 3.0, 4.0, "background", confidence=0.5, origin="suggestion")
-    set_up.labels.open(Labels((LabelTrack("Gestures"),), (offered,)))
+    show_labels(set_up.edits, Labels((LabelTrack("Gestures"),), (offered,)))
     seen = []
     set_up.model.changed.connect(lambda: seen.append(set_up.model.active))
     set_up.model.open()
