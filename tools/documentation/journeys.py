@@ -102,9 +102,9 @@ views, models, background thread, library
 1 sd2app/session/undo.py Edits.drag_sensor: one step in the end
 1 sd2app/session/sensor.py SensorModel.set_sensor: changed
 1 sd2app/maps/model.py SynthesisModel._follow: asks for a sweep
-1 sd2app/maps/model.py SynthesisModel._preview_quality: as exact as time allows
+1 sd2app/maps/model.py SynthesisModel._preview: as exact as time allows
 1 sd2app/background/latest.py LatestRunner.submit: the newest wins
-2 sd2app/maps/quality.py compute_part: frames of a map
+2 sd2app/maps/quality.py SynthesizerCache.part: frames of a map
 3 sd2core/doppler/synthesizer.py Synthesizer.stretch: as in the first picture
 1 sd2app/maps/partial_map.py PartialMap.take: back in the window's thread
 1 sd2app/session/maps.py MapModel.set_map: changed

@@ -24,11 +24,10 @@ from sd2app.maps.quality import (
     AT_ONCE,
     ROUGH_WORDS,
     Compiler,
+    Level,
     Postprocess,
-    QualityLevel,
     SynthesizerCache,
     budget_ms,
-    compute_part,
     final_words,
     refine,
 )
@@ -40,7 +39,7 @@ from sd2app.widgets.text import quoted
 from sd2core.cli.synth import Synth
 from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer, Visibility
+from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import deep_signature
 from sd2core.io.mesh_models import is_estimate
@@ -321,10 +320,10 @@ class SynthesisModel(ReportingModel):
 
         Raises Sd2Error if it is not complete.
         """
-        parts, synthesizers = self._partial.kept(), self._synthesizers
-        if synthesizers is None or not self.complete or not parts:
+        part, synthesizers = self._partial.kept(), self._synthesizers
+        if synthesizers is None or not self.complete or part is None:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
-        maker, (part,) = synthesizers.of(self._plan), parts
+        maker = synthesizers.of(self._plan)
         assert part.shares is not None
         limbs = part.limbs if synthesizers.limbs else None
         # What is smoothed no more needs no values before.
@@ -393,9 +392,10 @@ class SynthesisModel(ReportingModel):
 
     def _sweep(self) -> None:
         """Ask for a rough pass for the sensor where it is now, after the one under way."""
-        level, (start, stop) = self._preview_quality(), self._swept()
-        sweep = functools.partial(compute_part, level, self._sensor, start, stop)
-        self._next_sweep.append((sweep, self.postprocess()))
+        assert self._synthesizers is not None
+        part, wanted = self._synthesizers.part, (self._preview(), *self._swept())
+        sensor = self._sensor
+        self._next_sweep.append((lambda emit: part(sensor, emit, *wanted), self.postprocess()))
         self._woken.set()
         if not (self._sweeping and self._runner.busy):
             self._sweeping = True
@@ -419,7 +419,7 @@ class SynthesisModel(ReportingModel):
                         return before.result()
                     self._woken.wait()
                     continue
-                part = sweep(proceed=lambda: emit(None))
+                part = sweep(lambda: emit(None))
                 before.result()
                 before = beside.submit(more_of, part, postprocess)
                 before.add_done_callback(lambda _: self._woken.set())
@@ -436,7 +436,7 @@ class SynthesisModel(ReportingModel):
         self._accuracy.measured.rest_at(sensor)
         was_complete = self.complete
         self._set_moving(False)
-        final = self._final_quality()
+        final = self._final()
         if final is not None:
             self._restore(final)
         quality = self._partial.quality_for(sensor)
@@ -447,15 +447,20 @@ class SynthesisModel(ReportingModel):
             self._go_on()
             return
         self.refining.emit()
-        view, rough, vertices = self.frames_in_view(), self._preview_quality(), self._vertices
+        start, stop = self.frames_in_view()
+        stretches, levels, size = [(start, stop)], [self._preview()], self._at_once
         # Much of a long clip can wait until it is known how it is to be done.
-        only_view = final is None and not self._compiler.busy and not self._is_short
-        self._runner.submit(
-            lambda emit: refine(
-                sensor, quality, view, rough, final, vertices, emit, only_view=only_view
-            ),
-            "Synthesising the map" if final is not None else "",
-        )
+        if final is not None or self._compiler.busy or self._is_short:
+            stretches += [(stop, self._partial.frames), (0, start)]
+        if final is not None:
+            levels.append(final)
+        part = self._synthesizers.part
+
+        def work(emit: Emit) -> None:
+            compute = functools.partial(part, sensor, lambda: emit(None))
+            refine(compute, quality, stretches, levels, size, emit)
+
+        self._runner.submit(work, "Synthesising the map" if final is not None else "")
 
     def _go_on(self) -> None:
         """Start the next task while the sensor rests."""
@@ -466,13 +471,9 @@ class SynthesisModel(ReportingModel):
         elif not self.complete:
             self._settle()
         elif self._dragging_plan is not None and self._masks_of != self._sensor:
-            sensor, view = self._sensor, self._swept()
-            prepared = functools.partial(self._synthesizers.of, self._dragging_plan)
-            parts_of = self._synthesizers.parts_of
-            level = QualityLevel(prepared, PREVIEW, "", parts_of=parts_of)
-            self._prefetcher.submit(
-                lambda emit: compute_part(level, sensor, *view, lambda: emit(None))
-            )
+            part, sensor = self._synthesizers.part, self._sensor
+            wanted = (Level(self._dragging_plan, PREVIEW, ""), *self._swept())
+            self._prefetcher.submit(lambda emit: part(sensor, lambda: emit(None), *wanted))
 
     def _may_choose(self) -> bool:
         """True if the plans are for another sensor and the kernels are compiled."""
@@ -524,16 +525,16 @@ class SynthesisModel(ReportingModel):
         self._go_on()
 
     def _keep(self) -> None:
-        """Keep the final frames of what is being left, for when one comes back to it."""
-        if parts := self._partial.kept():
-            self._session.results.put(parts[0].key, parts, sum(one.size_bytes for one in parts))
+        """Keep the final map that is being left, for when one comes back to it."""
+        if (part := self._partial.kept()) is not None:
+            self._session.results.put(part.key, part, part.size_bytes)
 
-    def _restore(self, final: QualityLevel) -> None:
-        """Show final frames that were made before, with the same sensor, plan and options."""
-        for part in self._session.results.get(final.key_of(self._sensor)) or ():
-            quality = self._partial.quality_for(self._sensor)
-            if quality[part.start : part.stop].min() < FINAL:
-                self._take(part)
+    def _restore(self, final: Level) -> None:
+        """Show the final map if it was made before, with the same sensor, plan and options."""
+        assert self._synthesizers is not None
+        part = self._session.results.get(self._synthesizers.key(final.plan, self._sensor))
+        if part is not None and not self.complete:
+            self._take(part)
 
     def _take(self, part: Part) -> None:
         first = self._track.map is None
@@ -557,48 +558,34 @@ class SynthesisModel(ReportingModel):
 
     # --- helpers --------------------------------------------------------------------------
 
-    def _preview_quality(self) -> QualityLevel:
+    def _preview(self) -> Level:
         """Quality for what moves, and where no frame is computed yet."""
         assert self._synthesizers is not None
         synthesizers, dragging = self._synthesizers, self._accuracy.while_dragging
-
-        def preview(
-            synthesizer: Synthesizer, words: str, visibility: Visibility | None
-        ) -> QualityLevel:
-            parts_of = synthesizers.parts_of
-            return QualityLevel(lambda: synthesizer, PREVIEW, words, visibility, parts_of)
-
-        synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
-        if dragging is not None and synthesizer is not None:
-            words, reuse_m = f"while dragging: {dragging.accuracy}", dragging.plan.mask_reuse_m
-            if reuse_m == 0:
-                return preview(synthesizer, words, None)
+        if dragging is not None and synthesizers.ready(dragging.plan):
+            plan, words = dragging.plan, f"while dragging: {dragging.accuracy}"
+            if plan.mask_reuse_m == 0:
+                return Level(plan, PREVIEW, words)
             masks_of, here_m = self._masks_of, self._sensor.position_m
-            if masks_of is not None and math.dist(masks_of.position_m, here_m) <= reuse_m:
-                return preview(synthesizer, words, "frozen")
+            if masks_of and math.dist(masks_of.position_m, here_m) <= plan.mask_reuse_m:
+                return Level(plan, PREVIEW, words, "frozen")
         # The masks of rest serve until one for dragging is known.
-        newest = synthesizers.ready(self._plan) or synthesizers.full
+        newest = self._plan if synthesizers.ready(self._plan) else None
         if synthesizers.options.visibility == "none":
-            return preview(newest, ALL_WORDS, "none")
+            return Level(newest, PREVIEW, ALL_WORDS, "none")
         # Where the sensor stays, and things move, they are as good.
         if dragging is not None and not self.shows_sensor:
-            return preview(newest, ROUGH_WORDS, "facing")
-        return preview(newest, "preview: visibility of the nearest place", "frozen")
+            return Level(newest, PREVIEW, ROUGH_WORDS, "facing")
+        return Level(newest, PREVIEW, "preview: visibility of the nearest place", "frozen")
 
-    def _final_quality(self) -> QualityLevel | None:
+    def _final(self) -> Level | None:
         """Quality that the tolerance asks for; None until it is chosen."""
         if self._synthesizers is None or self._compiler.busy:
             return None
         if self._plan is None and self._may_choose():
             return None
-        synthesizers, plan = self._synthesizers, self._plan
-        return QualityLevel(
-            lambda: synthesizers.of(plan),
-            FINAL,
-            final_words(synthesizers, self._accuracy.in_use),
-            parts_of=synthesizers.parts_of,
-            key_of=functools.partial(synthesizers.key, plan),
-        )
+        words = final_words(self._synthesizers, self._accuracy.in_use)
+        return Level(self._plan, FINAL, words)
 
     @property
     def _files(self) -> str:
@@ -608,14 +595,15 @@ class SynthesisModel(ReportingModel):
         return hashlib.sha256(str(files).encode()).hexdigest()
 
     @property
-    def _vertices(self) -> int:
+    def _at_once(self) -> int:
+        """Frames that are computed in one go."""
         assert self._synthesizers is not None
-        return self._synthesizers.mesh.vertex_count
+        return max(AT_ONCE // self._synthesizers.mesh.vertex_count, 64)
 
     @property
     def _is_short(self) -> bool:
         """True if the clip is swept whole while the sensor is dragged."""
-        return self._vertices * self._partial.frames <= AT_ONCE
+        return self._partial.frames <= self._at_once
 
     def _swept(self) -> View:
         """Frames that follow a drag: the whole clip when it is short, else those in view."""

@@ -14,13 +14,12 @@ from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.maps import DopplerMap, LimbMaps
-from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
-ROUGH, PREVIEW, FINAL = 1, 2, 3
-"""Quality of a frame: rough, the preview while the sensor is dragged (or what was
-final for another plan), what the plan in use gives. 0 is not computed."""
+PREVIEW, FINAL = 1, 2
+"""Quality of a frame: a preview (or what was final for another plan), what the plan in use gives.
+0 is not computed."""
 
 View = tuple[int, int]
 
@@ -69,19 +68,14 @@ class PartialMap:
         """True if the map is split by the parts of the body."""
         return self._map is not None and self._map.limbs is not None
 
-    def kept(self) -> tuple[Part, ...]:
-        """Copies of the final frames, which can be taken again."""
-        made, sensor, shares = self._map, self.sensor, self._shares
-        if made is None or sensor is None:
-            return ()
-        words, limbs = self._words.get(FINAL, ""), made.limbs
-        return tuple(
-            Part(
-                sensor, start, made.values[:, start:stop].copy(),
-                None if limbs is None else deepcopy(limbs.between(start, stop)),
-                FINAL, words, made.unit, self._key, shares[:, start:stop].copy(),
-            )
-            for start, stop in runs(self.quality >= FINAL)
+    def kept(self) -> Part | None:
+        """A copy of the map once it is final, which can be taken again."""
+        made, sensor = self._map, self.sensor
+        if made is None or sensor is None or not self.final:
+            return None
+        return Part(
+            sensor, 0, made.values.copy(), deepcopy(made.limbs), FINAL, self._words[FINAL],
+            made.unit, self._key, self._shares.copy(),
         )  # fmt: skip
 
     def mark_stale(self) -> None:
@@ -166,21 +160,12 @@ def empty_map(options: SynthesisOptions, mesh: MeshSequence) -> DopplerMap:
     )
 
 
-def pieces(
-    quality: NDArray[np.uint8], below: int, start: int, stop: int, size: int
-) -> Iterator[View]:
-    """Stretches of at most ``size`` frames from ``start`` to ``stop`` whose quality is below.
-
-    ``quality`` may change while iterating.
-    """
-    while start < stop:
-        if quality[start] >= below:
-            start += 1
-            continue
-        inside = quality[start : min(stop, start + size)] < below
-        end = start + (len(inside) if inside.all() else int(inside.argmin()))
-        yield start, end
-        start = end
+def pieces(wanting: NDArray[np.bool_], start: int, stop: int, size: int) -> Iterator[View]:
+    """Stretches of at most ``size`` frames that have all that want something between two."""
+    for first in range(start, stop, size):
+        wanted = first + np.flatnonzero(wanting[first : min(first + size, stop)])
+        if wanted.size:
+            yield int(wanted[0]), int(wanted[-1]) + 1
 
 
 @dataclass(frozen=True, eq=False)

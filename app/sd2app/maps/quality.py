@@ -7,23 +7,22 @@ import math
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.accuracy.measurements import InUse
 from sd2app.background.latest import Emit
-from sd2app.maps.partial_map import FINAL, ROUGH, Part, View, pieces
+from sd2app.maps.partial_map import FINAL, Part, View, pieces
 from sd2app.session.tasks import ListedRunner
 from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Synthesizer, Visibility
 from sd2core.mesh.made_vertices import same_bodies
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.numerics.compiled import compile_in_background, kernels_compiled, kernels_ready
 from sd2core.sensor import VirtualSensor
 
@@ -35,7 +34,7 @@ _MAP_BUDGET_MS = 15.0
 of the time left to drawing."""
 
 AT_ONCE = 12_000_000
-"""Vertices times frames that are swept roughly in one go: a few ms up to some 20 ms."""
+"""Vertices times frames that are swept in one go: roughly in a few ms up to some 20 ms."""
 _BUDGET_BYTES = 192 << 20
 """For prepared frames: more than a clip takes that is swept in one go; of a longer one, what is in
 view."""
@@ -114,12 +113,42 @@ class SynthesizerCache:
                 self._made.popitem(last=False)
         return synthesizer
 
-    def parts_of(self, synthesizer: Synthesizer) -> VertexParts | None:
-        """Parts of the body, where they are wanted and known; the first time takes a moment."""
-        if not self.limbs:
-            return None
-        with self._lock:
-            return body_parts(synthesizer.mesh)
+    def part(
+        self,
+        sensor: VirtualSensor,
+        proceed: Callable[[], None],
+        level: Level,
+        start: int,
+        stop: int,
+    ) -> Part:
+        """Frames ``start`` to ``stop``, split by the parts of the body where that is wanted.
+
+        Parameters
+        ----------
+        sensor : VirtualSensor
+        proceed : callable
+            Called in between, and may raise to stop.
+        level : Level
+        start, stop : int
+        """
+        # A sweep does not wait while the synthesizer of another plan is being made.
+        synthesizer = self.ready(level.plan) or self.of(level.plan)
+        parts = body_parts(synthesizer.mesh) if self.limbs else None
+        final = level.quality == FINAL
+        made = synthesizer.stretch(
+            sensor, start, stop, level.visibility, lambda *_: proceed(), parts,
+            shares=final,  # which a map that is exported names
+        )  # fmt: skip
+        shares = None
+        if made.visible_share is not None and made.beyond_share is not None:
+            shares = np.stack([made.visible_share, made.beyond_share])
+        # Where no mask is kept.
+        rough = level.visibility == "frozen" and made.quality == "facing"
+        return Part(
+            sensor, start, made.values, made.limbs, level.quality,
+            ROUGH_WORDS if rough else level.words, synthesizer.unit,
+            self.key(level.plan, sensor) if final else None, shares,
+        )  # fmt: skip
 
     def ready(self, plan: AccuracyPlan | None) -> Synthesizer | None:
         """The synthesizer of a plan if there is one already; never waits."""
@@ -137,18 +166,13 @@ def _key(plan: AccuracyPlan) -> AccuracyPlan:
     return replace(plan, mask_reuse_m=0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class QualityLevel:
-    """Synthesizer and visibility with which frames are computed."""
+class Level(NamedTuple):
+    """With what frames are computed."""
 
-    synthesizer: Callable[[], Synthesizer]  # the first call may take long
+    plan: AccuracyPlan | None  # of the synthesizer
     quality: int  # rank of the computed frames
     words: str  # the same for people
     visibility: Visibility | None = None  # None: that of the synthesizer's options
-    parts_of: Callable[[Synthesizer], VertexParts | None] = lambda _: None
-    """Parts of the body by which the map is split, too."""
-    key_of: Callable[[VirtualSensor], Hashable] = lambda _: None
-    """Key of frames of the final quality."""
 
 
 def budget_ms(frames: int) -> float:
@@ -164,70 +188,39 @@ def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
     return ALL_WORDS if synthesizers.options.visibility == "none" else "exact visibility"
 
 
-def compute_part(
-    level: QualityLevel,
-    sensor: VirtualSensor,
-    start: int,
-    stop: int,
-    proceed: Callable[[], None] = lambda: None,
-) -> Part:
-    """Compute frames ``start`` to ``stop``; ``proceed`` is called in between and may raise."""
-    synthesizer = level.synthesizer()
-    stretch = synthesizer.stretch(
-        sensor, start, stop, level.visibility, lambda *_: proceed(), level.parts_of(synthesizer),
-        shares=level.quality == FINAL,  # which a map that is exported names
-    )  # fmt: skip
-    shares = None
-    if stretch.visible_share is not None and stretch.beyond_share is not None:
-        shares = np.stack([stretch.visible_share, stretch.beyond_share])
-    quality, words = level.quality, level.words
-    if level.visibility == "frozen" and stretch.quality == "facing":
-        # No mask is kept.
-        quality, words = ROUGH, ROUGH_WORDS
-    return Part(
-        sensor, start, stretch.values, stretch.limbs, quality, words, synthesizer.unit,
-        level.key_of(sensor), shares,
-    )  # fmt: skip
-
-
 def refine(
-    sensor: VirtualSensor,
+    compute: Callable[[Level, int, int], Part],
     quality: NDArray[np.uint8],
-    view: View,
-    rough: QualityLevel,
-    final: QualityLevel | None,
-    vertices: int,
+    stretches: Iterable[View],
+    levels: Sequence[Level],
+    size: int,
     emit: Emit,
-    *,
-    only_view: bool = False,
 ) -> None:
-    """Raise the quality of every frame: those in ``view`` first, those that follow, those before.
+    """Raise the quality of the frames of each stretch, by one level after another.
 
-    ``quality``, shape (T,), is raised in place. ``rough`` is for frames without any value;
-    ``final`` is the last stage of every frame, None stops at rough ones. ``vertices``, the size
-    of the mesh, decides how much is done at once. ``emit`` receives each :class:`Part` and
-    ``(done, total)`` frames, and raises to stop. ``only_view`` leaves the other frames for later.
+    Parameters
+    ----------
+    compute : callable
+        Gives the :class:`Part` from a frame to another.
+    quality : ndarray of uint8, shape (T,)
+        Ranks that the frames have.
+    stretches : iterable of View
+        The most urgent first.
+    levels : sequence of Level
+        The last is final, or there is none yet.
+    size : int
+        Frames that are computed at once.
+    emit : callable
+        Takes each part and, of final ones, ``(done, total)`` frames; raises to stop.
     """
-    rough_size = max(AT_ONCE // vertices, 64)
-    final_size = max(rough_size // 16, 8)
     done, total = 0, int((quality < FINAL).sum())
-
-    def run(below: int, part: View, size: int, level: QualityLevel) -> None:
-        nonlocal done
-        for start, stop in pieces(quality, below, *part, size):
-            made = compute_part(level, sensor, start, stop, lambda: emit(None))
-            quality[start:stop] = made.quality
-            emit(made)
-            if level.quality == FINAL:
-                done += stop - start
-                emit((done, total))
-
-    others = () if only_view else ((view[1], len(quality)), (0, view[0]))
-    for part in (view, *others):
-        if rough.quality < FINAL:
-            run(ROUGH, part, rough_size, rough)
-        if final is not None:
-            run(FINAL, part, final_size, final)
+    for stretch in stretches:
+        for level in levels:
+            for start, stop in pieces(quality < level.quality, *stretch, size):
+                emit(compute(level, start, stop))
+                if level.quality == FINAL:
+                    done += stop - start
+                    emit((done, total))
 
 
 _POLL_S = 0.2

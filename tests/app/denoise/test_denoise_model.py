@@ -15,6 +15,7 @@ from PySide6.QtCore import QObject
 from window_models import build_models
 
 from sd2app.denoise import map as denoised_map
+from sd2app.maps import model as maps_model
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL
@@ -397,11 +398,7 @@ def test_a_recording_with_the_same_model_needs_no_loading(context, models, qtbot
 def test_a_clip_is_denoised_while_it_is_synthesised_and_in_the_end_as_a_whole(
     context, models, qtbot, ball, monkeypatch
 ):
-    from sd2app.maps import model as maps_model
-    from sd2app.maps import quality
-
-    monkeypatch.setattr(quality, "AT_ONCE", 1)  # a few frames of the map after another
-    monkeypatch.setattr(maps_model, "AT_ONCE", 1)
+    monkeypatch.setattr(maps_model, "AT_ONCE", 1)  # a few frames of the map after another
     monkeypatch.setattr(denoised_map, "_BETWEEN_MS", 0)
     open_it(context, qtbot, ball)
     context.span.set_span(2.0, 2.5)

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, PartialMap, empty_map, pieces
+from sd2app.maps.partial_map import FINAL, PREVIEW, Part, PartialMap, empty_map, pieces
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.maps import LimbMaps
@@ -34,22 +34,21 @@ def paint(partial, sensor, start, values, quality, limbs=None):
 
 
 @given(
-    st.lists(st.integers(0, 3), min_size=1, max_size=80),
-    st.integers(1, 3),
+    st.lists(st.booleans(), min_size=1, max_size=80),
     st.integers(1, 20),
     st.data(),
 )
-def test_pieces_cover_what_is_below_once_and_nothing_else(ranks, below, size, data):
-    quality = np.array(ranks, np.uint8)
-    start = data.draw(st.integers(0, len(ranks)))
-    stop = data.draw(st.integers(start, len(ranks)))
-    covered = np.zeros(len(ranks), int)
-    for first, last in pieces(quality, below, start, stop, size):
-        assert 0 < last - first <= size
-        covered[first:last] += 1
-    inside = np.zeros(len(ranks), bool)
-    inside[start:stop] = True
-    np.testing.assert_array_equal(covered, (inside & (quality < below)).astype(int))
+def test_pieces_cover_all_that_want_something_in_their_order(wants, size, data):
+    wanting = np.array(wants)
+    start = data.draw(st.integers(0, len(wants)))
+    stop = data.draw(st.integers(start, len(wants)))
+    covered, before = np.zeros(len(wants), bool), start
+    for first, last in pieces(wanting, start, stop, size):
+        assert before <= first < last <= min(first + size, stop)
+        assert wanting[first]
+        assert wanting[last - 1]
+        covered[first:last], before = True, last
+    assert covered[start:stop][wanting[start:stop]].all()
 
 
 def test_a_new_placement_forgets_the_old_one():
@@ -57,24 +56,24 @@ def test_a_new_placement_forgets_the_old_one():
     here, there = VirtualSensor(), VirtualSensor(position_m=(1, 0, 0))
     paint(partial, here, 0, values_of(10, 1.0), FINAL)
     assert partial.final
-    paint(partial, there, 4, values_of(3, 2.0), ROUGH)
+    paint(partial, there, 4, values_of(3, 2.0), PREVIEW)
     assert not partial.full
     assert track.covered.tolist() == [False] * 4 + [True] * 3 + [False] * 3
-    assert partial.quality.tolist() == [0] * 4 + [ROUGH] * 3 + [0] * 3
+    assert partial.quality.tolist() == [0] * 4 + [PREVIEW] * 3 + [0] * 3
     assert not partial.quality_for(here).any()
     np.testing.assert_array_equal(partial.quality_for(there), partial.quality)
 
 
 def test_levels_refer_to_the_first_whole_map_and_until_then_to_what_there_is():
     (partial, track), here = partial_map(4), VirtualSensor()
-    paint(partial, here, 0, values_of(1, 0.0), ROUGH)
+    paint(partial, here, 0, values_of(1, 0.0), PREVIEW)
     assert track.reference == 1.0
-    paint(partial, here, 1, values_of(1, 3.0), ROUGH)
+    paint(partial, here, 1, values_of(1, 3.0), PREVIEW)
     assert track.reference == 3.0
     track.set_reference(8.0, by_hand=True)
-    paint(partial, here, 1, values_of(1, 3.0), ROUGH)
+    paint(partial, here, 1, values_of(1, 3.0), PREVIEW)
     assert track.reference == 8.0
-    paint(partial, here, 2, values_of(2, 5.0), ROUGH)
+    paint(partial, here, 2, values_of(2, 5.0), PREVIEW)
     assert track.reference == 5.0
     paint(partial, here, 0, values_of(4, 7.0), FINAL)
     assert track.reference == 5.0
@@ -83,26 +82,29 @@ def test_levels_refer_to_the_first_whole_map_and_until_then_to_what_there_is():
 def test_ranks_rise_to_final():
     partial, _ = partial_map(4)
     assert not partial.full
-    paint(partial, VirtualSensor(), 0, values_of(4, 1.0), ROUGH)
+    paint(partial, VirtualSensor(), 0, values_of(4, 1.0), PREVIEW)
     assert partial.full
     assert not partial.final
     paint(partial, VirtualSensor(), 0, values_of(4, 1.0), FINAL)
     assert partial.quality.min() == FINAL
 
 
-def test_what_is_left_is_kept_as_far_as_it_is_final():
+def test_what_is_left_is_kept_where_it_is_final():
     (partial, track), here = partial_map(4), VirtualSensor()
-    assert partial.kept() == ()
-    paint(partial, here, 0, values_of(4, 1.0), ROUGH)
-    assert partial.kept() == ()
-    paint(partial, here, 1, values_of(2, 2.0), FINAL)
+    for start, quality in ((0, PREVIEW), (1, FINAL)):
+        assert partial.kept() is None
+        paint(partial, here, start, values_of(4 - start, 1.0), quality)
+    assert partial.kept() is None
     assert track.key is None
-    (kept,) = partial.kept()
-    paint(partial, VirtualSensor(position_m=(1, 0, 0)), 0, values_of(4, 3.0), ROUGH)
-    assert (kept.key, kept.start, kept.stop) == ("key", 1, 3)
-    assert kept.values[0].tolist() == [2.0, 2.0]
-    paint(partial, here, 0, values_of(4, 2.0), FINAL)
+    paint(partial, here, 0, values_of(1, 2.0), FINAL)
     assert track.key == "key"
+    kept = partial.kept()
+    paint(partial, VirtualSensor(position_m=(1, 0, 0)), 0, values_of(4, 3.0), PREVIEW)
+    assert (kept.key, kept.start, kept.sensor) == ("key", 0, here)
+    assert kept.values[0].tolist() == [2.0, 1.0, 1.0, 1.0]
+    partial.take(kept)
+    assert partial.final
+    assert track.map.values[0].tolist() == [2.0, 1.0, 1.0, 1.0]
 
 
 def test_another_plan_leaves_the_values_until_they_are_replaced():

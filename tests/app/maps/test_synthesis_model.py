@@ -19,7 +19,7 @@ from window_models import build_models
 from sd2app.command_line import main as run
 from sd2app.maps import model as map_model
 from sd2app.maps import quality as map_quality
-from sd2app.maps.partial_map import FINAL, ROUGH
+from sd2app.maps.partial_map import FINAL, PREVIEW
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2core.accuracy.plans import AccuracyPlan
@@ -83,7 +83,7 @@ def test_rough_comes_before_exact(context, qtbot, ball):
     context.synthesis.painted.connect(note)
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
-    assert (ranks[1] == ROUGH).all()
+    assert (ranks[1] == PREVIEW).all()
     assert (ranks[-1] == FINAL).all()
     lowest = [quality.min() for quality in ranks]
     assert lowest == sorted(lowest)
@@ -581,8 +581,7 @@ def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball, compiled_kerne
 def test_a_long_clip_waits_with_what_is_out_of_view_until_the_plan_is_known(
     context, fake, qtbot, ball, monkeypatch
 ):
-    for module in ("quality", "model"):
-        monkeypatch.setattr(f"sd2app.maps.{module}.AT_ONCE", 1000)
+    monkeypatch.setattr(map_model, "AT_ONCE", 1000)
     fake.gate.clear()
     open_ball(context, qtbot, ball)
     context.span.set_span(1.0, 2.0)
