@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
@@ -45,7 +45,7 @@ F = TypeVar("F", bound=RunFolder)
 class History:
     """History of a run by its lines, at least how far it is.
 
-    Damaged lines are left out.
+    A method ``_take_EVENT`` takes the lines of an event; damaged ones are left out.
     """
 
     begun = True  # the process has said that it works
@@ -70,29 +70,23 @@ class History:
         """Take lines; True if any of them was of use."""
         taken = False
         for event in events:
-            reader = self.readers.get(str(event.get("event")))
+            reader = getattr(self, f"_take_{event.get('event')}", None)
             if reader is None:
                 continue
             try:
-                reader(self, event)
+                reader(event)
             except (KeyError, TypeError, ValueError, OverflowError):
                 continue
             taken = True
         return taken
 
-    def _count(self, event: dict[str, Any]) -> None:
+    def _take_progress(self, event: dict[str, Any]) -> None:
         self.done, self.total = int(event["done"]), int(event.get("total") or 0)
         left_s = event.get("left_s")
         self.told_left_s = None if left_s is None else float(left_s)
 
-    def _refuse(self, event: dict[str, Any]) -> None:
+    def _take_error(self, event: dict[str, Any]) -> None:
         self.error = str(event["text"])
-
-    readers: ClassVar[Mapping[str, Callable[[Any, dict[str, Any]], None]]] = {
-        "progress": _count,
-        "error": _refuse,
-    }
-    """Method that takes a line of progress, by the name of the line's event."""
 
 
 def reason_in(event: Mapping[str, Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked
@@ -71,11 +71,11 @@ class BatchHistory(History):
             return None
         return elapsed_s / max(elapsed_s + left_s, 1e-9)
 
-    def _start(self, event: Event) -> None:
+    def _take_start(self, event: Event) -> None:
         self.steps, self.failures = tuple(map(str, event.get("steps", ()))), []
-        self._count({})
+        self._take_progress({})
 
-    def _count(self, event: Event) -> None:
+    def _take_progress(self, event: Event) -> None:
         elapsed_s, left_s = event.get("elapsed_s"), event.get("left_s")
         self.elapsed_s = None if elapsed_s is None else float(elapsed_s)
         self.told_left_s = None if left_s is None else float(left_s)
@@ -83,7 +83,9 @@ class BatchHistory(History):
         self.workers, self.failed = int(event.get("workers", 0)), int(event.get("failed", 0))
         self.error = reason_in(event)
 
-    def _fail(self, event: Event) -> None:
+    _take_end = _take_progress
+
+    def _take_failed(self, event: Event) -> None:
         if len(self.failures) < _KEPT_FAILURES:
             placement = event.get("placement")
             self.failures.append(
@@ -94,8 +96,6 @@ class BatchHistory(History):
                     reason_in(event),
                 )
             )
-
-    readers: ClassVar = {"start": _start, "progress": _count, "end": _count, "failed": _fail}
 
 
 class BatchMonitor(RunMonitor[BatchFolder]):

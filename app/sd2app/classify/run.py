@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 from PySide6.QtCore import QObject
 
@@ -298,24 +298,22 @@ class ClassHistory(StepHistory):
         """The best check so far."""
         return next((check for check in reversed(self.checks) if check.best), None)
 
-    def _start(self, event: dict[str, Any]) -> None:
+    def _take_start(self, event: dict[str, Any]) -> None:
         self.total, self.begun = int(event["steps"]), True
 
-    def _step(self, event: dict[str, Any]) -> None:
+    def _take_step(self, event: dict[str, Any]) -> None:
         step, loss = int(event["step"]), float(event["loss"])
         self._advance(step, float(event["elapsed_s"]))
         if math.isfinite(loss):
-            self._note(self.losses, LossPoint(step, loss))
+            self.losses.append(LossPoint(step, loss))
 
-    def _check(self, event: dict[str, Any]) -> None:
+    def _take_check(self, event: dict[str, Any]) -> None:
         step, recall = int(event["step"]), float(event["validation_mean_recall"])
         best = self.best
         self.checks.append(CheckPoint(step, recall, best is None or recall > best.recall))
 
-    def _end(self, event: dict[str, Any]) -> None:
+    def _take_end(self, event: dict[str, Any]) -> None:
         self.saving = True
-
-    readers: ClassVar = {"start": _start, "step": _step, "check": _check, "end": _end}
 
 
 class ClassRun(CommandRun):

@@ -65,7 +65,7 @@ class ExportHistory(History):
 
     written: Exported | None = None
 
-    def _done(self, event: dict[str, Any]) -> None:
+    def _take_done(self, event: dict[str, Any]) -> None:
         self.written = Exported(
             Path(event["dataset"]),
             Path(event["card"]),
@@ -74,8 +74,6 @@ class ExportHistory(History):
             int(event["sources"]),
             tuple(map(str, event["failed"])),
         )
-
-    readers: ClassVar = {**History.readers, "done": _done}
 
 
 class ExportRun(CommandRun):

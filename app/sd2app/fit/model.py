@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,14 +61,14 @@ class FitProgress(History):
         self.newest: int | None = None  # frame of the landmarks that came last
         self.notes: list[str] = []
 
-    def _start(self, event: dict[str, Any]) -> None:
+    def _take_start(self, event: dict[str, Any]) -> None:
         if event["format"] != FORMAT or event["version"] > VERSION:
             raise ValueError("lines of another program, or of a later version")
         self.size = int(event["width"]), int(event["height"])
         self._stages = tuple(map(str, event["stages"]))
         self.resumed = bool(event.get("resumed", False))
 
-    def _report(self, event: dict[str, Any]) -> None:
+    def _take_progress(self, event: dict[str, Any]) -> None:
         stage, done, total = str(event["stage"]), int(event["done"]), int(event["total"])
         another = stage != self.stage
         self.stage, self.done, self.total = stage, done, total
@@ -77,7 +77,7 @@ class FitProgress(History):
         if share is not None and (another or not self._began):
             self._began.append((self._clock_s(), share))
 
-    def _find(self, event: dict[str, Any]) -> None:
+    def _take_landmarks(self, event: dict[str, Any]) -> None:
         image_px = np.array(event["image_px"], np.float32)  # null becomes NaN
         visibility = np.array(event["visibility"], np.float32)
         if image_px.shape != (len(LANDMARKS), 2) or visibility.shape != (len(LANDMARKS),):
@@ -85,7 +85,7 @@ class FitProgress(History):
         self.newest = int(event["frame"])
         self.landmarks[self.newest] = np.concatenate([image_px, visibility[:, None]], axis=1)
 
-    def _note(self, event: dict[str, Any]) -> None:
+    def _take_note(self, event: dict[str, Any]) -> None:
         if (text := str(event["text"])) not in self.notes:
             self.notes.append(text)
 
@@ -131,14 +131,6 @@ class FitProgress(History):
             return words
         unit = {"frame": "frame ", "step": "step "}.get(self.unit, "")
         return f"{words}, {unit}{self.done} of {self.total}"
-
-    readers: ClassVar = {
-        **History.readers,
-        "start": _start,
-        "progress": _report,
-        "landmarks": _find,
-        "note": _note,
-    }
 
 
 class FitRun(CommandRun):

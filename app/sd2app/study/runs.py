@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from PySide6.QtCore import QObject
 
@@ -28,11 +28,9 @@ SWITCHES = ("quick", "radar_only", "same_people")
 class StudyHistory(StepHistory):
     """Trainings that are done, of all."""
 
-    def _done(self, event: dict[str, Any]) -> None:
+    def _take_run(self, event: dict[str, Any]) -> None:
         self.total, self.begun = int(event["total"]), True
         self._advance(int(event["done"]), float(event["elapsed_s"]))
-
-    readers: ClassVar = {"run": _done}
 
 
 class StudyRun(CommandRun):

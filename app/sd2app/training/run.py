@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sd2app.background.run_monitor import History, RunMonitor, reason_in
 from sd2app.widgets.run_text import AT_WORK, PHASES
@@ -20,19 +20,12 @@ if TYPE_CHECKING:
     from sd2core.train.data import Split
 
 
-T = TypeVar("T")
-
-_MAX_POINTS = 2000
-"""Limit of kept steps; beyond it, every second one is dropped."""
-
-
 class StepHistory(History):
     """Steps of which the number may be known, and the pace at which they are done."""
 
     def __init__(self) -> None:
         self.begun = False
         self._pace = Throughput()
-        self._stride, self._skipped = 1, 0
 
     @property
     def left_s(self) -> float | None:
@@ -44,16 +37,6 @@ class StepHistory(History):
         if 0 <= elapsed_s < math.inf:
             self.elapsed_s = elapsed_s
             self._pace.take(steps, elapsed_s)
-
-    def _note(self, points: list[T], point: T) -> None:
-        """Keep a point of every step, or of every so many where there are too many."""
-        self._skipped += 1
-        if self._skipped >= self._stride:
-            self._skipped = 0
-            points.append(point)
-            if len(points) > _MAX_POINTS:
-                del points[1::2]
-                self._stride *= 2
 
 
 class StepPoint(NamedTuple):
@@ -101,7 +84,7 @@ class TrainingHistory(StepHistory):
             return min(self.elapsed_s / (60.0 * self.minutes), 1.0)
         return super().share
 
-    def _start(self, event: dict[str, Any]) -> None:
+    def _take_start(self, event: dict[str, Any]) -> None:
         steps_per_epoch, epochs = _count(event["steps_per_epoch"], 1), _count(event.get("epochs"))
         minutes, done = _number(event.get("minutes")), _count(event.get("steps_done"))
         parameters = _count(event.get("parameters"))
@@ -121,12 +104,12 @@ class TrainingHistory(StepHistory):
         self.begun, self.paused = True, False
         self.error = ""
 
-    def _stepped(self, event: dict[str, Any]) -> None:
+    def _take_step(self, event: dict[str, Any]) -> None:
         # Counted from the start of the run.
         step, rmse = _count(event["step"]), _number(event.get("train_rmse"))
         self._go_to(_count(event["epoch"], 1), step, event)
         if math.isfinite(rmse) and rmse > 0:
-            self._note(self.step_points, StepPoint(step / max(self.steps_per_epoch, 1), rmse))
+            self.step_points.append(StepPoint(step / max(self.steps_per_epoch, 1), rmse))
 
     def _go_to(self, epoch: int, steps: int, event: dict[str, Any]) -> None:
         elapsed_s, left_s = _number(event.get("elapsed_s")), _number(event.get("left_s"))
@@ -134,7 +117,7 @@ class TrainingHistory(StepHistory):
         self.left_s = left_s if 0 <= left_s < math.inf else None
         self._advance(steps, elapsed_s)
 
-    def _epoch_done(self, event: dict[str, Any]) -> None:
+    def _take_epoch(self, event: dict[str, Any]) -> None:
         epoch = _count(event["epoch"], 1)
         point = EpochPoint(
             epoch,
@@ -148,25 +131,16 @@ class TrainingHistory(StepHistory):
         self.epoch_points = [one for one in self.epoch_points if one.epoch < epoch]
         self.epoch_points.append(point)
 
-    def _ended(self, event: dict[str, Any]) -> None:
+    def _take_end(self, event: dict[str, Any]) -> None:
         # Lines before the next start do not say that it works.
         self.begun, self.paused, self.left_s = False, False, None
         self.error = reason_in(event)
 
-    def _pause(self, event: dict[str, Any]) -> None:
+    def _take_paused(self, event: dict[str, Any]) -> None:
         self.paused = True
 
-    def _go_on(self, event: dict[str, Any]) -> None:
+    def _take_resumed(self, event: dict[str, Any]) -> None:
         self.paused = False
-
-    readers: ClassVar = {
-        "start": _start,
-        "step": _stepped,
-        "epoch": _epoch_done,
-        "paused": _pause,
-        "resumed": _go_on,
-        "end": _ended,
-    }
 
 
 class TrainingFacts(NamedTuple):

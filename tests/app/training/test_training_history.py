@@ -130,18 +130,6 @@ def test_nothing_that_is_told_breaks_it(events) -> None:
     assert isinstance(metric_rows(history), list)
 
 
-def test_points_are_kept_few() -> None:
-    history = TrainingHistory()
-    history.take([{**START, "epochs": 20_000}])
-    history.take(step(number, steps=100_000) for number in range(1, 20_001))
-    assert 500 < len(history.step_points) <= 2000
-    gaps = {
-        round(5 * (b.at - a.at))
-        for a, b in zip(history.step_points, history.step_points[1:], strict=False)
-    }
-    assert max(gaps) <= 2 * min(gaps)
-
-
 @given(st.floats(1e-4, 1e3), st.floats(1.6, 1e4), st.integers(3, 9))
 def test_an_axis_of_errors_has_values_on_it(low, ratio, most) -> None:
     values = log_ticks(low, low * ratio, most)
