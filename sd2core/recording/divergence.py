@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 from sd2core.files.tables import counted
-from sd2core.files.texts import EXPECTED_JSON, read_content
 from sd2core.labels.comparison import compare
 from sd2core.labels.merging import chosen, merge
 from sd2core.labels.spans import Labels
@@ -96,19 +93,7 @@ class Divergence:
     def _changed(self) -> list[str]:
         """Settings that were changed elsewhere, to something else than here."""
         base, mine, theirs = (one.settings for one in (self.base, self.mine, self.theirs))
-        return [name for name in mine if theirs[name] not in (base[name], mine[name])]
-
-
-def digests_of(paths: Iterable[Path]) -> dict[str, str]:
-    """Hashes of texts by their files' names, without those that are not there.
-
-    Raises Sd2Error, unread, for one that is larger than a text can be.
-    """
-    return {
-        path.name: sha256(read_content(path, EXPECTED_JSON)).hexdigest()
-        for path in paths
-        if path.is_file()
-    }
+        return [name for name in WORDS if theirs[name] not in (base[name], mine[name])]
 
 
 def named(names: Iterable[str]) -> list[str]:

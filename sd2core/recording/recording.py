@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -39,7 +39,7 @@ from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.plausibility.clock import judge_assumed_rate
 from sd2core.progress import Progress, silent
-from sd2core.recording.divergence import WORDS, Divergence, State, digests_of
+from sd2core.recording.divergence import Divergence, State
 from sd2core.recording.document import VERSION, Document, read_document
 from sd2core.recording.relinking import (
     ROLES,
@@ -189,7 +189,6 @@ class Recording:
     # As the files were last read or written; None before.
     _read: Document = field(default_factory=Document, repr=False)
     _base: State | None = field(default=None, repr=False)
-    _digests: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @classmethod
     def create(
@@ -260,7 +259,6 @@ class Recording:
                 title=self.title or folder.stem,
                 labels_elsewhere=False,
                 _base=None,
-                _digests={},
             )
             made.save(timebase)
         except BaseException:
@@ -306,7 +304,7 @@ class Recording:
 
     def unlabel(self) -> None:
         """Take it back that it was labelled here, unless that was saved."""
-        if LABELS_NAME not in self._digests:
+        if not (self.folder / LABELS_NAME).exists():
             self.labels = None
 
     def effective_labels(self) -> Labels:
@@ -370,9 +368,9 @@ class Recording:
                 video=self.video,
             )
             self.spans = ()
-            self._note_written(LABELS_NAME)
+            if self._base is not None:
+                self._base = replace(self._base, labels=self.labels)
         atomic_write_json(self.folder / FILE_NAME, document.model_dump(mode="json"))
-        self._note_written(FILE_NAME)
         self._read, self._base = document, self.state()
 
     def _document(self) -> Document:
@@ -404,13 +402,8 @@ class Recording:
     # --- what others save -----------------------------------------------------------------
 
     def state(self) -> State:
-        """Settings and labels as they are now, to be compared with those of another time."""
-        settings = {name: getattr(self, name) for name in WORDS}
-        for role in ROLES:  # as they are read again
-            if settings[role] is not None:
-                stored = stored_path(settings[role], self.folder)
-                settings[role] = located_path(stored, self.folder)
-        return State(settings, self.labelled)
+        """Settings and labels as they would be read again, to be compared with others."""
+        return State(settings_of(self._document(), self.folder), self.labelled)
 
     @property
     def edited(self) -> bool:
@@ -419,7 +412,7 @@ class Recording:
 
     def accept(self, theirs: Recording) -> None:
         """Take what is on disk as known, so that :meth:`save` writes over it."""
-        self._read, self._base, self._digests = theirs._read, theirs._base, theirs._digests
+        self._read, self._base = theirs._read, theirs._base
 
     def divergence(self, theirs: Recording) -> Divergence:
         """Compare with the same recording as it is on disk by now."""
@@ -438,10 +431,7 @@ class Recording:
                 f"the folder that holds {FILE_NAME}",
                 "Bring it back, or save the recording in another folder",
             )
-        own_files = [self.folder / FILE_NAME, self.folder / LABELS_NAME]
-        if digests_of(own_files) == self._digests:
-            return
-        theirs = open_recording(self.folder)
+        theirs = _opened(self.folder, labels=not self.labels_elsewhere)
         divergence = self.divergence(theirs)
         if divergence.changes:
             raise SavedElsewhereError(theirs, divergence)
@@ -452,14 +442,10 @@ class Recording:
         """True if it was in its folder, and is not any more."""
         return self._base is not None and not (self.folder / FILE_NAME).is_file()
 
-    def _note_written(self, name: str) -> None:
-        self._digests = {**self._digests, **digests_of([self.folder / name])}
-
     def read_labels_again(self) -> None:
         """Read ``labels.json`` again, if there is one; Sd2Error if it is damaged."""
         labels = self.folder / LABELS_NAME
         if labels.exists():
-            self._note_written(LABELS_NAME)
             self.labels = read_labels(labels).labels
             if self._base is not None:
                 self._base = replace(self._base, labels=self.labels)
@@ -639,17 +625,16 @@ def open_recording(path: Path) -> Recording:
     8
     """
     path = as_path(path)
-    folder = plain_path(path.parent if path.name == FILE_NAME else path)
-    # Taken first: what is written while it is read counts as another's.
-    digests = digests_of([folder / FILE_NAME])
+    return _opened(plain_path(path.parent if path.name == FILE_NAME else path))
+
+
+def _opened(folder: Path, *, labels: bool = True) -> Recording:
     document = read_document(folder / FILE_NAME)
     with errors_in(folder / FILE_NAME):
         settings = settings_of(document, folder)
-    settings["title"] = document.title or folder.stem
-    recording = Recording(
-        folder, **settings, spans=document.spans, _read=document, _digests=digests
-    )
-    recording.read_labels_again()
+    recording = Recording(folder, **settings, spans=document.spans, _read=document)
+    if labels:
+        recording.read_labels_again()
     recording._base = recording.state()
     return recording
 
@@ -671,6 +656,7 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
     return {
         **{name: getattr(document, name) for name in _AS_THEY_ARE},
         **{role: located(role, getattr(document, role)) for role in ROLES},
+        "title": document.title or folder.stem,
         "imu_places": tuple(dict.fromkeys(document.imu_places)),
         "sensor": VirtualSensor.from_dict(document.sensor.model_dump()),
         "placements": None if planned is None else placements_from_dict(planned),
