@@ -206,8 +206,10 @@ def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> No
     """Write a mesh block by block into one compressed ``.npz``, in one step."""
     step = frames_per_chunk(mesh.vertices.shape, mesh.vertices.dtype)
     dtype = np.dtype(mesh.vertices.dtype).newbyteorder("<")
-    with atomic_write(path) as stream, zipfile.ZipFile(stream, "w") as archive:
-        with archive.open(_member("vertices"), "w", force_zip64=True) as member:
+    deflate = zipfile.ZIP_DEFLATED
+    with atomic_write(path) as stream, zipfile.ZipFile(stream, "w", deflate) as archive:
+        # Without a date, so that the same mesh gives the same bytes.
+        with archive.open("vertices.npy", "w", force_zip64=True) as member:
             header = {"descr": dtype.str, "fortran_order": False, "shape": mesh.vertices.shape}
             np.lib.format.write_array_header_1_0(member, header)
             for start in range(0, mesh.frame_count, step):
@@ -215,7 +217,7 @@ def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> No
                 member.write(_block(mesh, start, step).astype(dtype, copy=False).tobytes())
         texts = {} if mesh.uncertainty is None else {"limbs": np.array(mesh.uncertainty.limbs)}
         for name, array in (small_arrays(mesh) | texts).items():
-            with archive.open(_member(name), "w") as member:
+            with archive.open(f"{name}.npy", "w") as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
     progress(mesh.frame_count, mesh.frame_count)
 
@@ -300,13 +302,6 @@ def frames_per_chunk(shape: tuple[int, ...], dtype: Any) -> int:
     """Frames of a chunk of about 2 MB."""
     frame_bytes = shape[1] * 3 * np.dtype(dtype).itemsize
     return int(min(max(_CHUNK_BYTES // frame_bytes, 1), shape[0]))
-
-
-def _member(name: str) -> zipfile.ZipInfo:
-    """An entry with a fixed date, so that the same mesh gives the same bytes."""
-    entry = zipfile.ZipInfo(f"{name}.npy")
-    entry.compress_type = zipfile.ZIP_DEFLATED
-    return entry
 
 
 def _zip_folder(folder: Path, stream: Any) -> None:

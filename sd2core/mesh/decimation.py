@@ -18,10 +18,10 @@ _SIZE = 100.0
 """Size that a surface is brought to: the library's thresholds are absolute, and finer there."""
 
 
-def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> MeshSequence:
+def decimate(mesh: MeshSequence, kept: float) -> MeshSequence:
     """A mesh with about ``kept`` of the vertices, chosen once for the whole clip.
 
-    The surface of one frame is simplified by collapsing edges (quadric errors, by
+    The surface of the frame in the middle is simplified by collapsing edges (quadric errors, by
     the library fast-simplification). Every vertex that stays is one of the mesh's
     own, of those merged together the one nearest to their middle, so that it moves as
     it always did; ``vertex_counts`` says for how many it stands. Vertices of pieces that vanish
@@ -33,8 +33,6 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
     kept : float
         Share of the faces, and so of a closed surface's vertices, above 0 and up
         to 1. 1 gives the mesh itself.
-    frame : int, optional
-        Frame whose surface is simplified; by default the one in the middle.
 
     Returns
     -------
@@ -54,17 +52,17 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
     if kept == 1:
         return mesh
     if (still := unshifted(mesh)[0]) is not mesh:  # the same vertices wherever it stands
-        return shifted_like(decimate(still, kept, frame=frame), mesh)
+        return shifted_like(decimate(still, kept), mesh)
     if mesh.faces is None:
         raise Sd2Error(
             f"{name} has no faces, it is a point cloud",
             "a surface to take vertices from",
             "Keep all vertices, or give the faces (--faces)",
         )
-    frame = mesh.frame_count // 2 if frame is None else frame
+    frame = mesh.frame_count // 2
     points = mesh.frame(frame).astype(np.float64)
     refuse_missing(points[None], frame, mesh.source)
-    others = tuple(decimate(body, kept, frame=frame) for body in mesh.others)
+    others = tuple(decimate(body, kept) for body in mesh.others)
     simplified = _simplify(points, mesh.faces, kept)
     if simplified is None:
         note = "not decimated: fewer than four faces would be left"
