@@ -23,6 +23,7 @@ from sd2core.files.paths import (
     files_at,
     free_path,
     is_absolute,
+    is_there,
     located_path,
     plain_path,
     remove,
@@ -45,14 +46,11 @@ from sd2core.recording.relinking import (
     ROLES,
     Relinked,
     Role,
-    body_role,
     exists,
-    faces_role,
     find_again,
     is_many,
     is_thing,
     role_words,
-    thing_role,
 )
 from sd2core.sensor import VirtualSensor
 
@@ -280,11 +278,10 @@ class Recording:
     @property
     def bodies_there(self) -> tuple[Body, ...]:
         """Other bodies whose meshes are where the recording says."""
-        missing = self.missing()
         return tuple(
             one
-            for index, one in enumerate(self.bodies)
-            if not {body_role(index), faces_role(index)} & missing.keys()
+            for one in self.bodies
+            if is_there(Path(one.path)) and (one.faces is None or Path(one.faces).exists())
         )
 
     @property
@@ -578,10 +575,10 @@ class Recording:
 
     def _files(self) -> dict[Role, Path]:
         paths = {role: getattr(self, role) for role in ROLES}
-        for index, one in enumerate(self.bodies):
-            paths |= {body_role(index): one.path, faces_role(index): one.faces}
+        for number, one in enumerate(self.bodies, start=2):  # the mesh is of body 1
+            paths |= {f"body {number}": one.path, f"faces of body {number}": one.faces}
         for number, thing in enumerate(self.things, start=1):
-            paths[thing_role(number)] = thing.shape if thing.is_file else None
+            paths[f"thing {number}"] = thing.shape if thing.is_file else None
         return {role: Path(path) for role, path in paths.items() if path is not None}
 
     def _present(self, role: Role) -> Path:
@@ -670,16 +667,16 @@ def _with_files(
     """Things and bodies of a recording with other paths of their files."""
     return {
         "things": tuple(
-            replace(one, shape=str(path_of(thing_role(number), one.shape))) if one.is_file else one
+            replace(one, shape=str(path_of(f"thing {number}", one.shape))) if one.is_file else one
             for number, one in enumerate(things, start=1)
         ),
         "bodies": tuple(
             replace(
                 one,
-                path=str(path_of(body_role(index), one.path)),
-                faces=None if one.faces is None else str(path_of(faces_role(index), one.faces)),
+                path=str(path_of(f"body {number}", one.path)),
+                faces=one.faces and str(path_of(f"faces of body {number}", one.faces)),
             )
-            for index, one in enumerate(bodies)
+            for number, one in enumerate(bodies, start=2)
         ),
     }
 

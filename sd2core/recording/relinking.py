@@ -13,30 +13,12 @@ from sd2core.progress import Progress
 Role = str
 """Role of a file in a recording: one of :data:`ROLES`, or of a mesh of the scene.
 
-Such as ``body 2``, beside the first, or ``thing 1``.
+Such as ``body 2``, beside the first, ``faces of body 2``, or ``thing 1``.
 """
 
 ROLES: tuple[Role, ...] = ("video", "mesh", "faces", "radar", "denoiser", "imu")
 
-_BODY = "body "
-
-
-def body_role(index: int) -> Role:
-    """Role of one of the other bodies, counted from 0; the mesh is of body 1."""
-    return f"{_BODY}{index + 2}"
-
-
-def faces_role(index: int) -> Role:
-    """Role of the file with the faces of one of the other bodies, counted from 0."""
-    return f"faces of {body_role(index)}"
-
-
-_THING = "thing "
-
-
-def thing_role(number: int) -> Role:
-    """Role of the mesh file of a thing, counted from 1."""
-    return f"{_THING}{number}"
+_BODY, _THING = "body ", "thing "
 
 
 def is_thing(role: Role) -> bool:
