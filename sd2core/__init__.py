@@ -19,95 +19,63 @@ from typing import TYPE_CHECKING, Any
 from sd2core.version import __version__
 
 if TYPE_CHECKING:
-    from sd2core.denoise.files import load_model
-    from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-    from sd2core.errors import Sd2Error
-    from sd2core.fmcw import doppler_map
-    from sd2core.imu.virtual import virtual_imu
-    from sd2core.io.bodies import with_bodies
-    from sd2core.io.mesh import load_mesh, save_mesh
-    from sd2core.io.radar import load_capture
-    from sd2core.io.radar.capture import RadarCapture
-    from sd2core.io.things import with_things, with_walls
-    from sd2core.io.video import VideoReader, open_video
-    from sd2core.maps import DopplerMap
-    from sd2core.mesh.bodies import Body
-    from sd2core.mesh.sequence import MeshSequence
-    from sd2core.mesh.things import Thing
-    from sd2core.mesh.walls import Wall
-    from sd2core.radar_config import PAPER_RADAR, RadarConfig
-    from sd2core.recording.recording import Recording, Span, open_recording, open_sample
-    from sd2core.sensor import Beam, VelocityAxis, VirtualSensor
-    from sd2core.timebase import Timebase
+    from sd2core.denoise.files import load_model as load_model
+    from sd2core.doppler import PRESETS as PRESETS
+    from sd2core.doppler import SynthesisOptions as SynthesisOptions
+    from sd2core.doppler import Synthesizer as Synthesizer
+    from sd2core.errors import Sd2Error as Sd2Error
+    from sd2core.fmcw import doppler_map as doppler_map
+    from sd2core.imu.virtual import virtual_imu as virtual_imu
+    from sd2core.io.bodies import with_bodies as with_bodies
+    from sd2core.io.mesh import load_mesh as load_mesh
+    from sd2core.io.mesh import save_mesh as save_mesh
+    from sd2core.io.radar import load_capture as load_capture
+    from sd2core.io.radar.capture import RadarCapture as RadarCapture
+    from sd2core.io.things import with_things as with_things
+    from sd2core.io.things import with_walls as with_walls
+    from sd2core.io.video import VideoReader as VideoReader
+    from sd2core.io.video import open_video as open_video
+    from sd2core.maps import DopplerMap as DopplerMap
+    from sd2core.mesh.bodies import Body as Body
+    from sd2core.mesh.sequence import MeshSequence as MeshSequence
+    from sd2core.mesh.things import Thing as Thing
+    from sd2core.mesh.walls import Wall as Wall
+    from sd2core.radar_config import PAPER_RADAR as PAPER_RADAR
+    from sd2core.radar_config import RadarConfig as RadarConfig
+    from sd2core.recording.recording import Recording as Recording
+    from sd2core.recording.recording import Span as Span
+    from sd2core.recording.recording import open_recording as open_recording
+    from sd2core.recording.recording import open_sample as open_sample
+    from sd2core.sensor import Beam as Beam
+    from sd2core.sensor import VelocityAxis as VelocityAxis
+    from sd2core.sensor import VirtualSensor as VirtualSensor
+    from sd2core.timebase import Timebase as Timebase
 
-__all__ = [
-    "PAPER_RADAR",
-    "PRESETS",
-    "Beam",
-    "Body",
-    "DopplerMap",
-    "MeshSequence",
-    "RadarCapture",
-    "RadarConfig",
-    "Recording",
-    "Sd2Error",
-    "Span",
-    "SynthesisOptions",
-    "Synthesizer",
-    "Thing",
-    "Timebase",
-    "VelocityAxis",
-    "VideoReader",
-    "VirtualSensor",
-    "Wall",
-    "__version__",
-    "doppler_map",
-    "load_capture",
-    "load_mesh",
-    "load_model",
-    "open_recording",
-    "open_sample",
-    "open_video",
-    "save_mesh",
-    "virtual_imu",
-    "with_bodies",
-    "with_things",
-    "with_walls",
-]
-
-_HOME = {
-    "Body": "mesh.bodies",
-    "PAPER_RADAR": "radar_config",
-    "PRESETS": "doppler",
-    "Beam": "sensor",
-    "DopplerMap": "maps",
-    "MeshSequence": "mesh.sequence",
-    "RadarCapture": "io.radar.capture",
-    "RadarConfig": "radar_config",
-    "Recording": "recording.recording",
-    "Sd2Error": "errors",
-    "Span": "recording.recording",
-    "SynthesisOptions": "doppler",
-    "Synthesizer": "doppler",
-    "Thing": "mesh.things",
-    "Timebase": "timebase",
-    "VelocityAxis": "sensor",
-    "VideoReader": "io.video",
-    "VirtualSensor": "sensor",
-    "Wall": "mesh.walls",
-    "doppler_map": "fmcw",
-    "load_capture": "io.radar",
-    "load_mesh": "io.mesh",
-    "load_model": "denoise.files",
-    "open_recording": "recording.recording",
-    "open_sample": "recording.recording",
-    "open_video": "io.video",
-    "save_mesh": "io.mesh",
-    "virtual_imu": "imu.virtual",
-    "with_bodies": "io.bodies",
-    "with_things": "io.things",
-    "with_walls": "io.things",
+_MODULES = {
+    "denoise.files": "load_model",
+    "doppler": "PRESETS SynthesisOptions Synthesizer",
+    "errors": "Sd2Error",
+    "fmcw": "doppler_map",
+    "imu.virtual": "virtual_imu",
+    "io.bodies": "with_bodies",
+    "io.mesh": "load_mesh save_mesh",
+    "io.radar": "load_capture",
+    "io.radar.capture": "RadarCapture",
+    "io.things": "with_things with_walls",
+    "io.video": "VideoReader open_video",
+    "maps": "DopplerMap",
+    "mesh.bodies": "Body",
+    "mesh.sequence": "MeshSequence",
+    "mesh.things": "Thing",
+    "mesh.walls": "Wall",
+    "radar_config": "PAPER_RADAR RadarConfig",
+    "recording.recording": "Recording Span open_recording open_sample",
+    "sensor": "Beam VelocityAxis VirtualSensor",
+    "timebase": "Timebase",
 }
+_HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
+
+__all__ = ["__version__", *_HOME]
 
 
 def __getattr__(name: str) -> Any:
