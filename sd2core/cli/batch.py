@@ -92,8 +92,7 @@ def _batch(options: Batch) -> int | Report:
         return _status(options.status)
     if options.stop is not None:
         BatchFolder(options.stop).tell("stop")
-        print(f"Stopping {options.stop}")
-        return 0
+        return Report(f"Stopping {options.stop}", {"out": str(options.stop), "told": "stop"})
     assert options.plan is not None
     from sd2core.batch.plan_file import read_plan
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import duration, print_facts, print_json, print_rows
+from sd2core.cli.output import Report, duration, print_facts, print_json, print_rows
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENT, Place
 from sd2core.options.shared import Json
@@ -45,7 +45,7 @@ class Runs(Json):
 
 
 @command("runs", Runs)
-def _runs(options: Runs) -> None:
+def _runs(options: Runs) -> Report | None:
     """List training runs, and pause, stop or cancel one.
 
     Lists the runs of `sd2 train` in a folder: how far they are, how good, and whether
@@ -62,8 +62,7 @@ def _runs(options: Runs) -> None:
 
     for word in WORDS:
         if getattr(options, word):
-            _steer(TrainingFolder(options.folder), word)
-            return
+            return _steer(TrainingFolder(options.folder), word)
     runs = runs_in(options.folder)
     if options.json:
         print_json({"runs": [{"path": str(run.path), **asdict(run.status())} for run in runs]})
@@ -71,18 +70,18 @@ def _runs(options: Runs) -> None:
         _print_one(runs[0])
     else:
         _print_table(runs)
+    return None
 
 
-def _steer(run: TrainingFolder, word: Command) -> None:
-    state = run.state()
+def _steer(run: TrainingFolder, word: Command) -> Report:
+    state, data = run.state(), {"path": str(run.path), "told": word}
     if word == "cancel" and state in ("stopped", "died", "failed"):
         lock = run.lock()
         lock.release()
         run.discard()
-        print(f"{run.path} is deleted")
-        return
+        return Report(f"{run.path} is deleted", data)
     run.tell("run" if word == "resume" else word)
-    print(f"{run.path} is told to {'go on' if word == 'resume' else word}")
+    return Report(f"{run.path} is told to {'go on' if word == 'resume' else word}", data)
 
 
 def _print_one(run: TrainingFolder) -> None:

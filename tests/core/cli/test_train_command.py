@@ -215,7 +215,8 @@ class TestRuns:
         lock = run.lock()
         try:
             for word, written in (("pause", "pause"), ("resume", "run"), ("stop", "stop")):
-                assert sd2("runs", run.path, f"--{word}").code == 0
+                told = json.loads(sd2("runs", run.path, f"--{word}", "--json").out)
+                assert told == {"path": str(run.path), "told": word}
                 assert run.control.read_text() == f"{written}\n"
         finally:
             lock.release()
