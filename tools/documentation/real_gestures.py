@@ -85,7 +85,7 @@ def main() -> None:
     sources = [LabelledSource(folder) for folder in DATA]
     paths = [one.path for one in unfolded(sources)]
     recorded = [load_kkt(path) for path in paths]
-    known = clips_of(sources, None)
+    known = clips_of(sources, ("radar",))
     judged = []  # (splits, files)
     for number in range(SPLITS):
         part = {

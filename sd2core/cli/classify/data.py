@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from sd2core.cli.output import progress_bar, tell_lost
-from sd2core.cli.recording_maps import MapName, maps_of, usual_maps
+from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Typed
@@ -64,12 +64,11 @@ class SourcesAndMaps(Sources):
 
 
 def clips_of(
-    sources: Sequence[LabelledSource], maps: Sequence[MapName] | None, denoiser: str | None = None
+    sources: Sequence[LabelledSource], maps: Sequence[MapName], denoiser: str | None = None
 ) -> ClipSet:
     """Return all clips of the sources as one set.
 
-    ``maps`` None: the radar's and, where there are some, synthetic ones. The denoiser, given by
-    file or name, makes the denoised maps of pairs.
+    The denoiser, given by file or name, makes the denoised maps of pairs.
     """
     from sd2core.classify.data import clips_of_pairs, merged
     from sd2core.datasets.labelled import unfolded
@@ -95,7 +94,7 @@ def clips_of(
     if stores:
         pairs = read_mixed(stores)
         tell_lost(pairs.lost_frames)
-        for name in maps or ("synthetic", "radar"):
+        for name in maps:
             wanted: MapKind = pairs.kind if name == "radar" else name
             sets.append(clips_of_pairs(pairs, wanted, _denoiser_of(pairs, wanted, denoiser)))
     return merged(sets)
@@ -126,23 +125,23 @@ def split_of(
     return list(dict.fromkeys(names)) or None
 
 
-def _of_dataset(path: Path, maps: Sequence[MapName] | None) -> list[ClipSet]:
+def _of_dataset(path: Path, maps: Sequence[MapName]) -> list[ClipSet]:
     from sd2core.datasets.clips import clips_of_dataset
     from sd2core.datasets.reading import open_dataset
 
     with open_dataset(path) as dataset:
         kinds = dataset.header.kinds
         wanted: list[MapKind] = []
-        for name in maps or ("synthetic", "radar"):
+        for name in maps:
             matching = [kind for kind in kinds if name == ("radar" if kind in _RADARS else kind)]
-            if not matching and maps is not None:
+            if not matching:
                 raise Sd2Error(f"{path} holds no {name} maps", f"one of {', '.join(kinds)}")
             wanted += matching
         return [clips_of_dataset(dataset, kind) for kind in wanted]
 
 
 def _single(
-    one: LabelledSource, maps: Sequence[MapName] | None, frame_rate_hz: float | None
+    one: LabelledSource, maps: Sequence[MapName], frame_rate_hz: float | None
 ) -> list[ClipSet]:
     """Return the clips of a recording or a radar file, at the frame rate of the first map."""
     from sd2core.classify.data import clips_of_map
@@ -151,7 +150,7 @@ def _single(
     from sd2core.recording.recording import is_recording, open_recording
 
     if holds_map(one.path):
-        if maps is not None and tuple(maps) != ("radar",):
+        if tuple(maps) != ("radar",):
             raise Sd2Error(f"{one.path} holds a radar's map only", "--maps radar")
         return [clips_of_radar_file(one, frame_rate_hz)]
     if not is_recording(one.path):
@@ -164,14 +163,13 @@ def _single(
 
     recording, labels = open_recording(one.path), labels_at(one.path)
     labels_given(labels, one.path)
-    names = tuple(maps or usual_maps(recording))
     maps_and_labels: Iterable[tuple[str, DopplerMap, Labels]]
     if labels.persons:
-        maps_and_labels = _of_persons(recording, one, names)
+        maps_and_labels = _of_persons(recording, one, maps)
     else:
         # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
         axis = None if recording.mesh is None else PRESETS["paper"].axis
-        made = maps_of(recording, names, axis=axis)
+        made = maps_of(recording, tuple(maps), axis=axis)
         maps_and_labels = [(one.subject, doppler, labels) for doppler in made.values()]
     clip_sets: list[ClipSet] = []
     for subject, doppler, own in maps_and_labels:
