@@ -250,7 +250,7 @@ def write(
             "the file as it was read",
             "Run the command again",
         )
-    if file_format is None and path.suffix.lower() == ".json":
+    if file_format == "sd2" or (file_format is None and path.suffix.lower() == ".json"):
         files.write_labels(path, labels, timebase=timebase, video=media)
         return []
     clock = needed(timebase, str(path))

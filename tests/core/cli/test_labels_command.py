@@ -163,7 +163,8 @@ def test_convert_there_and_back_and_what_is_not_kept(sd2: Sd2, anna: Path, tmp_p
     assert "with 3 spans" in done.out
     assert "not kept: Audacity keeps no notes: 3 notes left out" in done.out
     back = tmp_path / "back.json"
-    assert sd2("labels", "convert", out, "--out", back).code == 0
+    for words in ((), ("--to", "sd2", "--overwrite")):  # without frame times, named or not
+        assert sd2("labels", "convert", out, "--out", back, *words).code == 0
     before, after = files.read_labels(anna).labels, files.read_labels(back).labels
     assert [(s.start_s, s.end_s, s.label) for s in after.spans] == [
         (s.start_s, s.end_s, s.label) for s in before.spans
