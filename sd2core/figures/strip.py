@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
+from sd2core.body.model import vertex_normals
 from sd2core.figures.colours import DIVERGING, rgb, velocity_colours
 from sd2core.figures.strip_source import Row, StripOptions, StripSource, check_strip
 from sd2core.figures.surface import Frame, find_visible_triangles, lightness, project_vertices
 from sd2core.files.figure_files import save_figure
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.things import joined
 from sd2core.progress import Progress, silent
 from sd2core.scattering.velocity import moments, radial_velocity
 from sd2core.sensor import VirtualSensor
@@ -179,7 +181,7 @@ class Body:
     """Everybody of one frame as one mesh, and the colours (V, 3) of its vertices from 0 to 1."""
 
     vertices_m: NDArray[np.float64]
-    faces: NDArray[np.int32] | None
+    faces: NDArray[np.int32]  # none of a cloud of points
     colours: NDArray[np.float64]
 
     @classmethod
@@ -190,22 +192,18 @@ class Body:
         shown = [(mesh, at) for mesh in each if (at := mesh.person_at(time_s)) is not None]
         if not shown:
             return None
-        vertices = [np.asarray(mesh.frame(number), np.float64) for mesh, number in shown]
-        colours = np.tile(rgb(_PLAIN), (sum(map(len, vertices)), 1))
+        none = np.empty((0, 3), np.int32)
+        vertices_m, faces = joined(
+            [
+                (mesh.frame(number).astype(np.float64), none if mesh.faces is None else mesh.faces)
+                for mesh, number in shown
+            ]
+        )
+        colours = np.tile(rgb(_PLAIN), (len(vertices_m), 1))
         if options.colour == "velocity":
             velocity = [_velocity(mesh, number, source.sensor) for mesh, number in shown]
             colours = velocity_colours(np.concatenate(velocity), options.v_max_mps)
-        firsts = np.cumsum([0, *map(len, vertices)]).tolist()
-        faces = [
-            mesh.faces + first
-            for (mesh, _), first in zip(shown, firsts, strict=False)
-            if mesh.faces is not None
-        ]
-        return cls(
-            np.concatenate(vertices),
-            np.concatenate(faces) if faces else None,
-            colours.astype(np.float64) / 255,
-        )
+        return cls(vertices_m, faces, colours.astype(np.float64) / 255)
 
 
 def _velocity(mesh: MeshSequence, frame: int, sensor: VirtualSensor) -> NDArray[np.float64]:
@@ -262,23 +260,21 @@ def _draw_picture(
         axes.text(0.5, 0.5, "no person", transform=where, fontsize=7, color=_MUTED, **_CENTRED)
         return
     over = row == "overlay"
-    if options.as_dots or body.faces is None:
+    if options.as_dots or not len(body.faces):
         _draw_dots(axes, body, source.camera, box, over)
     else:
-        image = _surface(body, body.faces, source.camera, box, over)
+        image = _surface(body, source.camera, box, over)
         axes.imshow(image, extent=extent, aspect="auto", interpolation="antialiased")
 
 
-def _surface(
-    body: Body, faces: NDArray[np.int32], camera: PinholeCamera, box: Frame, over: bool
-) -> NDArray[np.uint8]:
+def _surface(body: Body, camera: PinholeCamera, box: Frame, over: bool) -> NDArray[np.uint8]:
     """The surface lit from the camera, as RGBA bytes."""
     zoom = _SURFACE_PIXELS / box.width
     fine = Frame(
         box.left, box.top, max(round(box.width * zoom), 1), max(round(box.height * zoom), 1), zoom
     )
-    view = find_visible_triangles(body.vertices_m, faces, camera, fine)
-    light = lightness(body.vertices_m, faces)[:, None]
+    view = find_visible_triangles(body.vertices_m, body.faces, camera, fine)
+    light = lightness(body.vertices_m, body.faces)[:, None]
     colours = rgb(_OVERLAY) / 255 if over else body.colours
     rgba = np.zeros((*view.owner.shape, 4), np.float32)
     shown = view.interpolated(colours * light)
@@ -302,8 +298,9 @@ def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _draw_dots(axes: Axes, body: Body, camera: PinholeCamera, box: Frame, over: bool) -> None:
     pixels, depth = project_vertices(body.vertices_m, camera)
     shown = np.isfinite(depth)
-    if body.faces is not None:
-        shown &= _faces_camera(body.vertices_m, body.faces)
+    if len(body.faces):
+        normals = vertex_normals(body.vertices_m, body.faces)
+        shown &= (normals * body.vertices_m).sum(axis=1) < 0
     order = np.flatnonzero(shown)[np.argsort(-depth[shown], kind="stable")]
     if over:
         # One dot in a cell, the nearest: what is under it has to stay visible.
@@ -319,13 +316,3 @@ def _draw_dots(axes: Axes, body: Body, camera: PinholeCamera, box: Frame, over: 
         linewidths=0,
         rasterized=True,
     )
-
-
-def _faces_camera(vertices_m: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Vertices with a triangle that faces the camera."""
-    corners = vertices_m[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = np.einsum("fi,fi->f", normal, corners[:, 0]) < 0
-    result = np.zeros(len(vertices_m), bool)
-    result[faces[facing]] = True
-    return result
