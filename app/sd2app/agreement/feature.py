@@ -272,7 +272,7 @@ class AgreementFeature(Feature):
     def _compare(self) -> None:
         parent = self._shell.dialog_parent
         if path := ask_file(parent, "Compare with another's labels", label_files()):
-            self.model.open(path)
+            self._shell.attempt(lambda: self.model.open(path))
             self._shell.bring_up("Agreement")
 
     def panels(self) -> Mapping[str, QWidget]:
@@ -285,7 +285,8 @@ class AgreementFeature(Feature):
 
     def attach(self) -> None:
         """Compare anew, or forget the comparison of the recording before."""
-        if self._session.document.same_recording and self.model.path is not None:
-            self.model.open(self.model.path)
+        path = self.model.path
+        if self._session.document.same_recording and path is not None:
+            self._shell.attempt(lambda: self.model.open(path))
         else:
             self.model.clear()

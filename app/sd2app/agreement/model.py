@@ -15,7 +15,7 @@ from sd2app.session.session import Session
 from sd2app.widgets.text import quoted
 from sd2core.cli.labels.agree import Agree
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
-from sd2core.labels.formats import LabelReading, read_label_file
+from sd2core.labels.formats import read_label_file
 from sd2core.labels.import_labels import Incoming
 from sd2core.labels.spans import Labels
 from sd2core.options.records import words_of
@@ -41,7 +41,6 @@ class AgreementModel(ReportingModel):
         self.left_out = 0  # spans of theirs outside the recording
         self.measures: Agreement | None = None  # until they are computed
         self.disagreements: tuple[Disagreement, ...] = ()  # in order
-        self._reader = LatestRunner("labels", self, self._receive, self._fail)
         self._comparer = LatestRunner("agreement", self, self._take, self._fail)
         labels.changed.connect(self._compare)
 
@@ -73,13 +72,22 @@ class AgreementModel(ReportingModel):
         return next((k for k, one in places if one.start_s <= now_s < one.end_s), None)
 
     def open(self, path: Path) -> None:
-        """Compare with the labels of a file, in the background."""
+        """Compare with the labels of a file; Sd2Error or OSError where it cannot be read."""
         base = self._playback.timebase
-        self._reader.submit(lambda emit: (path, read_label_file(path, base)))
+        reading = read_label_file(path, base)
+        incoming = Incoming.of(reading.labels, base)
+        self.path, self.sentence, self.left_out = path, reading.sentence, len(incoming.outside)
+        self.measures, self.disagreements = None, ()
+        # Colours are those of this recording wherever it has the label.
+        own = self._labels.labels.label_set
+        names = {one.name for one in own.labels}
+        more = [one for one in incoming.labels.label_set.labels if one.name not in names]
+        colours = replace(own, labels=(*own.labels, *(replace(one, key="") for one in more)))
+        self.other.open(replace(incoming.labels, label_set=colours))
+        self._compare()
 
     def clear(self) -> None:
         """End the comparison."""
-        self._reader.cancel()
         self._comparer.cancel()
         if self.active:
             self.path, self.sentence = None, ""
@@ -97,20 +105,6 @@ class AgreementModel(ReportingModel):
             self._playback.seek(start_s)
             self._span.reveal(start_s)
             self.changed.emit()
-
-    def _receive(self, result: tuple[Path, LabelReading]) -> None:
-        self.path, reading = result
-        incoming = Incoming.of(reading.labels, self._playback.timebase)
-        self.sentence = reading.sentence
-        self.left_out = len(incoming.outside)
-        self.measures, self.disagreements = None, ()
-        # Colours are those of this recording wherever it has the label.
-        own = self._labels.labels.label_set
-        names = {one.name for one in own.labels}
-        more = [one for one in incoming.labels.label_set.labels if one.name not in names]
-        colours = replace(own, labels=(*own.labels, *(replace(one, key="") for one in more)))
-        self.other.open(replace(incoming.labels, label_set=colours))
-        self._compare()
 
     def _compare(self) -> None:
         if not self.active:

@@ -94,7 +94,7 @@ class SceneView(QWidget):
             (session.sensor.dragging_changed, self._follow_sensor),
             (session.document.changed, self._follow_things),
             (session.sensor.dragging_changed, self._follow_things),
-            (session.playback.time_changed, self._follow_clock),
+            (session.playback.frame_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),

@@ -17,7 +17,6 @@ class PlaybackModel(QObject):
     follows from elapsed time, so a late frame is dropped rather than slowing the clock.
     """
 
-    time_changed = Signal(float)
     frame_changed = Signal(int)
     playing_changed = Signal(bool)
     speed_changed = Signal(float)
@@ -156,4 +155,3 @@ class PlaybackModel(QObject):
         if frame != self.frame or force or not self.playing:
             self.frame = frame
             self.frame_changed.emit(frame)
-            self.time_changed.emit(time_s)

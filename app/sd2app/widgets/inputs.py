@@ -70,15 +70,12 @@ class NumberBox(QDoubleSpinBox):
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMinimumWidth(72)
-        self._typing = False
-        self.lineEdit().textEdited.connect(self._begin_typing)
-        self.editingFinished.connect(self._end_typing)
+        self.editingFinished.connect(lambda: self.lineEdit().setModified(False))
 
     def show_value(self, value: float) -> None:
         """Follow a model, unless the user is typing; emits nothing."""
-        if self._typing:
-            return
-        if abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals():
+        differs = abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals()
+        if differs and not self.lineEdit().isModified():
             with QSignalBlocker(self):
                 self.setValue(value)
 
@@ -132,7 +129,6 @@ class NumberBox(QDoubleSpinBox):
         """End the editing with Return or Escape."""
         ends = event.key() in _ENDING_KEYS
         if event.key() == Qt.Key.Key_Escape:
-            self._end_typing()
             self.lineEdit().setText(
                 self.prefix() + self.textFromValue(self.value()) + self.suffix()
             )
@@ -163,12 +159,6 @@ class NumberBox(QDoubleSpinBox):
             super().wheelEvent(event)
         else:
             event.ignore()
-
-    def _begin_typing(self, text: str) -> None:
-        self._typing = True
-
-    def _end_typing(self) -> None:
-        self._typing = False
 
 
 def option_box(
