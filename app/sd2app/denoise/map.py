@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, Emit, delayed
+from sd2app.background.latest import BackgroundModel, Emit
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteSession
 from sd2app.maps.partial_map import Part, PartialMap
 from sd2app.maps.quality import Postprocess
@@ -30,12 +30,6 @@ _TOO_SLOW_S = 0.15
 
 _TRIED = 3
 """Number of sweeps that decide if a model is too slow."""
-
-_BETWEEN_MS = 80
-"""Shortest interval between denoisings while the synthetic map is refined."""
-
-_REST = 4
-"""Interval after a denoising, as a multiple of its own time: the process serves others too."""
 
 _LISTED = 2048
 """Frames from which a denoising is listed as a task that can be cancelled."""
@@ -67,9 +61,17 @@ class _Answer(NamedTuple):
 
     start: int
     doppler: DopplerMap
-    cost_s: float  # live: of each frame
-    session: RemoteSession | None = None  # live: at its end
-    known: NDArray[np.bool_] | None = None  # (n,): frames that there was an input of; None: all
+    known: NDArray[np.bool_]  # (n,): frames that there was an input of
+    revision: int  # of the synthetic map
+
+
+class _LiveAnswer(NamedTuple):
+    """Frames that the clock has reached, denoised, and what the model remembers at their end."""
+
+    start: int
+    doppler: DopplerMap
+    cost_s: float  # of each frame
+    session: RemoteSession
 
 
 class DenoisedMap(BackgroundModel):
@@ -96,14 +98,12 @@ class DenoisedMap(BackgroundModel):
         self._texture: Texture | None = None
         self._movements: KnownMovements | None = None
         self._sensor: object = None  # placement that the synthetic map is of
-        self._stale = True  # the synthetic map has changed since the model was asked
         self._held = False  # it follows the clock
         self._reached: _Reached | None = None  # by it; None: begin where it is
         self._runner = ListedRunner("denoise", session.jobs, self, self._receive, self._fail)
         self._runner.cancelled.connect(self._give_up)
         self._stumbled.connect(self._fail)
         session.playback.frame_changed.connect(self._step)
-        self._again = delayed(self._go_on, _BETWEEN_MS, self)
         self._took_s: deque[float] = deque(maxlen=5)
 
     # --- what is known --------------------------------------------------------------------
@@ -154,7 +154,6 @@ class DenoisedMap(BackgroundModel):
         self.words = words
         self.track.set_status(words)
         self._partial.forget()
-        self._stale = True
         if denoiser is None:
             self.track.set_map(None)
         elif not self._restore():
@@ -163,7 +162,7 @@ class DenoisedMap(BackgroundModel):
     def clear(self) -> None:
         """Remove the map."""
         self._stop()
-        self._sensor, self._stale = None, True
+        self._sensor = None
         self._partial.forget()
         self.track.set_map(None)
 
@@ -173,7 +172,7 @@ class DenoisedMap(BackgroundModel):
         if not self._held:
             self.track.set_status(self.words)
         self._follow(sensor)
-        if not self._restore() and not self._again.isActive():
+        if not self._restore():
             self._go_on()
 
     def postprocess(self) -> Postprocess | None:
@@ -200,17 +199,15 @@ class DenoisedMap(BackgroundModel):
     def take_sweep(self, sensor: object, start: int, swept: Swept | None) -> None:
         """Show the preview that was denoised during a drag."""
         self._runner.cancel()
-        self._again.stop()
         self._follow(sensor)
         self._partial.quality[:] = 0
         if self.denoiser is None or self._held:
             return
         if swept is not None and swept.denoiser is self.denoiser:
             self._paint(start, swept.doppler)
-            self._stale = not self._partial.full
         else:
             self.track.set_status(f"{self.words} · {_WAITS}")
-        self._publish()
+        self._partial.show()
 
     def set_live(self, live: bool) -> None:
         """Denoise frame by frame as the clock reaches them, as beside a radar, or the whole map."""
@@ -220,7 +217,7 @@ class DenoisedMap(BackgroundModel):
         self._stop()
         self._restart()
         if live:
-            self._publish()
+            self._partial.show()
             self._step()
         else:
             self.track.set_status(self.words)
@@ -248,7 +245,7 @@ class DenoisedMap(BackgroundModel):
         if ahead.size and ahead.all():
             self._runner.submit(self._advance(self._reached, frame + 1))
 
-    def _advance(self, reached: _Reached, stop: int) -> Callable[[Emit], _Answer]:
+    def _advance(self, reached: _Reached, stop: int) -> Callable[[Emit], _LiveAnswer]:
         """Go on to a frame, with what the model remembers of those before."""
         source, denoiser, start = self._synthetic.map, self.denoiser, reached.next
         texture = self._texture
@@ -258,23 +255,23 @@ class DenoisedMap(BackgroundModel):
         energies = input_of(stretch, denoiser.card.parts).copy()
         like = replace(stretch, kind="denoised", meta={}, uncertainty=None, limbs=None)
 
-        def work(emit: Emit) -> _Answer:
+        def work(emit: Emit) -> _LiveAnswer:
             session = reached.session or denoiser.live()
             began = time.perf_counter()
             answers = session.advance(energies, stretch.present_mask)
             cost_s = (time.perf_counter() - began) / len(answers)
             made = _drawn(texture, replace(like, values=answers.T), start)
-            return _Answer(start, made, cost_s, session)
+            return _LiveAnswer(start, made, cost_s, session)
 
         return work
 
-    def _take_live(self, answer: _Answer) -> None:
+    def _take_live(self, answer: _LiveAnswer) -> None:
         assert self.denoiser is not None
         if self._reached is not None and self._reached.session is None:
             self._partial.quality[:] = 0  # it began here
         self._reached = _Reached(answer.start + len(answer.doppler.timebase), answer.session)
         self._paint(answer.start, answer.doppler)
-        self._publish()
+        self._partial.show()
         # A model that looks at a window of frames knows no later ones here.
         past = "" if self.denoiser.equals_batch else ", from past frames only"
         source, rate_hz = self._synthetic.map, self.denoiser.card.frame_rate_hz
@@ -299,8 +296,6 @@ class DenoisedMap(BackgroundModel):
             return False
         self._stop()
         self._paint(0, kept)
-        self._stale = False
-        self._publish()
         self._end()
         return True
 
@@ -308,7 +303,6 @@ class DenoisedMap(BackgroundModel):
 
     def _restart(self) -> None:
         """Mark all frames as not denoised; those on screen stay until there are better ones."""
-        self._stale = True
         if self._partial.frames == self._synthetic.known.size:
             self._partial.quality[:] = 0
         else:
@@ -318,7 +312,6 @@ class DenoisedMap(BackgroundModel):
         if sensor != self._sensor or self._partial.frames != self._synthetic.known.size:
             self._sensor = sensor
             self._restart()
-        self._stale = True
 
     def _go_on(self) -> None:
         source, known, denoiser = self._synthetic.map, self._synthetic.known, self.denoiser
@@ -329,22 +322,21 @@ class DenoisedMap(BackgroundModel):
             return
         numbers = np.flatnonzero(known)
         start, stop = int(numbers[0]), int(numbers[-1]) + 1
-        known = known[start:stop].copy()
-        self._stale = False
+        known, revision = known[start:stop].copy(), self._synthetic.revision
 
         def work(emit: Emit) -> _Answer:
-            began = time.perf_counter()
             # Not copied: if values change while they are read, they are read once more.
             stretch = source.between(start, stop)
             if not known.all():
                 stretch = replace(stretch, present=stretch.present_mask & known)
             made = _drawn(texture, denoiser.denoise(stretch), start)
-            return _Answer(start, made, time.perf_counter() - began, known=known)
+            return _Answer(start, made, known, revision)
 
         self._runner.submit(work, "Denoising the map" if len(known) > _LISTED else "")
 
     def _end(self) -> None:
-        """Everything is denoised: say which frames the model passes through."""
+        """Show that everything is denoised, and say which frames the model passes through."""
+        self._partial.show(self._key if self._partial.full else None)
         shown, key = self.track.map, self.track.key
         if shown is not None and key is not None and self._results.get(key) is None:
             kept = replace(shown, values=shown.values.copy())
@@ -358,16 +350,16 @@ class DenoisedMap(BackgroundModel):
                 )
         self.idle.emit()
 
-    def _receive(self, answer: _Answer) -> None:
-        if answer.session is not None:
+    def _receive(self, answer: _Answer | _LiveAnswer) -> None:
+        if isinstance(answer, _LiveAnswer):
             self._take_live(answer)
             return
         self._paint(answer.start, answer.doppler, answer.known)
-        self._publish()
-        if self._stale:
-            self._again.start(max(_BETWEEN_MS, round(1e3 * _REST * answer.cost_s)))
-        else:
+        if answer.revision == self._synthetic.revision:
             self._end()
+        else:
+            self._partial.show()
+            self._go_on()
 
     def _paint(self, start: int, made: DopplerMap, known: NDArray[np.bool_] | None = None) -> None:
         """Take over frames from ``start`` on, those that there was an input of."""
@@ -380,14 +372,9 @@ class DenoisedMap(BackgroundModel):
             )
         self._partial.paint(start, made.values, 1 if known is None else known.astype(np.uint8))
 
-    def _publish(self) -> None:
-        final = self._partial.full and not self._stale
-        self._partial.show(self._key if final else None)
-
     def _give_up(self) -> None:
         """Stay as it is, on the user's request."""
         self._stop()
-        self._stale = False
         self.idle.emit()
 
     def _fail(self, error: Exception) -> None:
@@ -403,7 +390,6 @@ class DenoisedMap(BackgroundModel):
     def _stop(self) -> None:
         self._runner.cancel()
         self._reached = None
-        self._again.stop()
 
 
 def cut_out(

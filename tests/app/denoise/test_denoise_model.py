@@ -399,7 +399,6 @@ def test_a_clip_is_denoised_while_it_is_synthesised_and_in_the_end_as_a_whole(
     context, models, qtbot, ball, monkeypatch
 ):
     monkeypatch.setattr(maps_model, "AT_ONCE", 1)  # a few frames of the map after another
-    monkeypatch.setattr(denoised_map, "_BETWEEN_MS", 0)
     open_it(context, qtbot, ball)
     context.span.set_span(2.0, 2.5)
     context.denoise.use(next(iter(models.cards)))
