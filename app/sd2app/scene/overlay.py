@@ -75,7 +75,6 @@ class Overlay(Canvas):
         self.marker_words: list[str] = []
         self.thing_names: list[str] = []
         self._legend = QRectF()
-        self._states: tuple[object, ...] = (None, None)  # what legend and the rest show
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
@@ -90,23 +89,11 @@ class Overlay(Canvas):
         return words + 2 * _PAD + 2 * _GAP + 4.0
 
     def paint(self, painter: QPainter) -> None:
-        """Paint all texts; legend and the rest are repainted only after a change."""
-        scene, navigator, colouring = self._scene, self._navigator, self._scene.colouring
-        legend = (
-            (self.font(), scene.colours, scene.has_mesh, scene.knows_hidden),
-            (colouring.mode, colouring.v_max_mps, colouring.range_limits_m, colouring.limbs),
-        )
-        rest = (
-            (self.message, self.hint, scene.pose, scene.sensor, scene.metre_labels),
-            (navigator.target, navigator.holds_sensor, navigator.held_thing),
-        )
-        if legend != self._states[0]:
-            self._kept.clear()
-        elif rest != self._states[1]:
-            self._kept.pop(self._paint_rest, None)
-        self._states = legend, rest
-        self.paint_kept(painter, self._paint_legend)
-        self.paint_kept(painter, self._paint_rest)
+        """Paint all texts."""
+        for part in (self._paint_legend, self._paint_rest):
+            painter.save()
+            part(painter)
+            painter.restore()
         if self.reading:
             area = QRectF(self.rect())
             paint_readout(painter, area, self._read_at, (self.reading,), self._colours)
