@@ -35,20 +35,14 @@ class Target:
     kind: Literal["sensor", "marker", "movable"]
     number: int = 0  # of the place, or of what can be moved: bodies after things
     vertex: int = field(default=0, compare=False)
-    place_m: Vector | None = field(default=None, compare=False)
+    place_m: Vector | None = field(default=None, compare=False)  # where it is taken hold of
 
 
 @dataclass
 class _Held:
-    start_m: Vector
-    offset_px: tuple[float, float]
-    constraint: Constraint
-
-
-@dataclass
-class _HeldThing:
-    number: int  # of those that are shown, bodies after things
+    number: int | None  # of those that are shown, bodies after things; None: the sensor
     at_m: Vector  # where it was taken hold of
+    offset_px: tuple[float, float]
     moved_m: Vector
 
 
@@ -70,7 +64,6 @@ class Navigator:
         self.target: Target | None = None  # under the pointer
         self._button: Qt.MouseButton | None = None
         self._held: _Held | None = None
-        self._held_thing: _HeldThing | None = None
         self._moving: Literal["orbit", "pan"] | None = None
         self._last_px = (0.0, 0.0)
         self._pressed_px: tuple[float, float] | None = None  # until it is no click any more
@@ -83,7 +76,7 @@ class Navigator:
     @property
     def holds_sensor(self) -> bool:
         """True while the sensor is dragged."""
-        return self._held is not None
+        return self._held is not None and self._held.number is None
 
     def sensor_at(self, x_px: float, y_px: float) -> bool:
         """True if the sensor is close enough to the pointer."""
@@ -97,8 +90,8 @@ class Navigator:
     @property
     def held_thing(self) -> tuple[int, tuple[float, ...], tuple[float, ...]] | None:
         """Number of the thing or body that is dragged, where it is held, and how far it moved."""
-        held = self._held_thing
-        if held is None:
+        held = self._held
+        if held is None or held.number is None:
             return None
         return held.number, triple(held.at_m + held.moved_m), triple(held.moved_m)
 
@@ -106,7 +99,7 @@ class Navigator:
         """Target at a place of the view; nothing that is behind the first body."""
         scene, pose = self._scene, self._scene.pose
         if self.sensor_at(x_px, y_px):
-            return Target("sensor")
+            return Target("sensor", place_m=np.asarray(self._scene.sensor.position_m))
         marker = pose.nearest(scene.markers.positions_m, x_px, y_px, _MARKER_PX)
         if marker is not None:
             return Target("marker", marker)
@@ -127,15 +120,14 @@ class Navigator:
         target = self.target_at(x_px, y_px) if left else None
         self._button = button
         self._last_px = self._pressed_px = (x_px, y_px)
-        if target is not None and target.kind == "sensor":
-            start = np.asarray(self._scene.sensor.position_m)
-            x, y, _ = self._scene.pose.project(start)[0]
-            self._held = _Held(start, (x - x_px, y - y_px), _constraint(keys))
-            self._edits.begin_sensor_drag()
-            self._show_hot()
-        elif target is not None and target.place_m is not None:
-            self._held_thing = _HeldThing(target.number, target.place_m, np.zeros(3))
-            self._edits.begin_scene_drag(target.number)
+        if target is not None and target.place_m is not None:
+            x, y, _ = self._scene.pose.project(target.place_m)[0]
+            number = None if target.kind == "sensor" else target.number
+            self._held = _Held(number, target.place_m, (x - x_px, y - y_px), np.zeros(3))
+            if number is None:
+                self._edits.begin_sensor_drag()
+            else:
+                self._edits.begin_scene_drag(number)
             self._show_hot()
         elif left and not keys & Qt.KeyboardModifier.ShiftModifier:
             self._moving = "orbit"
@@ -147,14 +139,12 @@ class Navigator:
         if self._pressed_px is not None:
             if math.dist(self._pressed_px, (x_px, y_px)) >= _CLICK_PX:
                 self._pressed_px = None
-            elif self._held is None:
+            elif not self.holds_sensor:
                 return
         dx, dy = x_px - self._last_px[0], y_px - self._last_px[1]
         self._last_px = (x_px, y_px)
         if self._held is not None:
             self._drag(self._held, x_px, y_px, _constraint(keys))
-        elif self._held_thing is not None:
-            self._drag_thing(self._held_thing, x_px, y_px, _constraint(keys))
         elif self._moving is not None:
             pose = self._scene.pose
             self._scene.preset = None
@@ -178,8 +168,8 @@ class Navigator:
     def let_go(self) -> None:
         """End whatever is going on, e.g. because the view is hidden."""
         self._button = self._moving = self._pressed_px = None
-        if self._held is not None or self._held_thing is not None:
-            self._held = self._held_thing = None
+        if self._held is not None:
+            self._held = None
             self._edits.end_drag()
             self._show_hot()
 
@@ -194,36 +184,28 @@ class Navigator:
 
     def wheel(self, x_px: float, y_px: float, notches: float) -> None:
         """Zoom with the wheel; positive comes nearer."""
-        if self._held is None and self._held_thing is None:
+        if self._held is None:
             self._scene.pose = self._scene.pose.zoomed(_ZOOM_PER_NOTCH**notches, x_px, y_px)
             self._changed()
 
     def _drag(self, held: _Held, x_px: float, y_px: float, constraint: Constraint) -> None:
         x, y = x_px + held.offset_px[0], y_px + held.offset_px[1]
-        if constraint != held.constraint:
-            # Go on from here: the other constraint must not make it jump back.
-            held.start_m = np.asarray(self._scene.sensor.position_m)
-            held.constraint = constraint
-        if constraint == "view":
-            position: Vector | None = drag_in_view(held.start_m, self._scene.pose, x, y)
-        else:
-            down = np.array([0.0, 1.0, 0.0])
-            sight = self._scene.extent.centre_m - held.start_m
-            direction = down if constraint == "vertical" else sight
-            position = drag_along(held.start_m, direction, self._scene.pose, x, y)
-        if position is not None:
-            self._edits.drag_sensor(triple(position))
-
-    def _drag_thing(
-        self, held: _HeldThing, x_px: float, y_px: float, constraint: Constraint
-    ) -> None:
+        # From here, where another constraint must not make it jump.
         pose, now = self._scene.pose, held.at_m + held.moved_m
         if constraint == "vertical":
-            at = drag_along(now, np.array([0.0, 1.0, 0.0]), pose, x_px, y_px)
+            at = drag_along(now, np.array([0.0, 1.0, 0.0]), pose, x, y)
+        elif held.number is not None:
+            at = drag_level(now, pose, x, y)
+        elif constraint == "sight":
+            at = drag_along(now, self._scene.extent.centre_m - now, pose, x, y)
         else:
-            at = drag_level(now, pose, x_px, y_px)
-        if at is not None:
-            held.moved_m = at - held.at_m
+            at = drag_in_view(now, pose, x, y)
+        if at is None:
+            return
+        held.moved_m = at - held.at_m
+        if held.number is None:
+            self._edits.drag_sensor(triple(at))
+        else:
             self._scene.movables.shift(held.number, held.moved_m)
             self._edits.drag_in_scene(triple(held.moved_m))
             self._changed()
@@ -235,10 +217,9 @@ class Navigator:
 
     def _show_hot(self) -> None:
         kind, number = (self.target.kind, self.target.number) if self.target else ("", 0)
-        self._scene.set_hot(kind == "sensor" or self._held is not None)
-        movable = number if kind == "movable" else None
-        held = self._held_thing
-        self._scene.movables.set_hot(movable if held is None else held.number)
+        self._scene.set_hot(kind == "sensor" or self.holds_sensor)
+        movable, held = number if kind == "movable" else None, self.held_thing
+        self._scene.movables.set_hot(movable if held is None else held[0])
         self._changed()
 
 
