@@ -29,13 +29,8 @@ class DifferenceModel(QObject):
         self.denoised, self.real = session.maps.denoised, session.maps.real
         self._session = session
         self.wanted = session.settings.stored(_SHOWN, False)  # by the user
-        self._gain: float | None = None
         for signal in (self.denoised.changed, self.real.changed, session.display.levels_changed):
-            signal.connect(self._follow)
-
-    def _follow(self) -> None:
-        self._gain = None
-        self.changed.emit()
+            signal.connect(self.changed)
 
     @property
     def why_not(self) -> str:
@@ -70,27 +65,25 @@ class DifferenceModel(QObject):
     @property
     def gain(self) -> float:
         """Factor that makes the denoised map as strong as the measured one."""
-        one, other = self.denoised, self.real
-        if self._gain is None and one.map is not None and other.map is not None:
-            start_s = max(one.offset_s + one.map.times_s[0], other.offset_s + other.map.times_s[0])
-            end_s = min(one.offset_s + one.map.times_s[-1], other.offset_s + other.map.times_s[-1])
-            parts = []
-            for track in (one, other):
-                assert track.map is not None
-                own_s = track.map.times_s + track.offset_s
-                frames = track.known & (start_s <= own_s) & (own_s <= end_s)
-                values = np.delete(track.values[:, frames], self.blank_bins, axis=0)
-                # Their frames are of other lengths.
-                parts.append(values.sum(axis=1) / max(np.count_nonzero(frames), 1))
-            self._gain = matching_gain(*parts)
-        return self._gain or 1.0
+        tracks, own_s, parts = (self.denoised, self.real), [], []
+        for track in tracks:
+            if track.map is None:
+                return 1.0
+            own_s.append(track.map.times_s + track.offset_s)
+        start_s, end_s = max(one[0] for one in own_s), min(one[-1] for one in own_s)
+        for track, times_s in zip(tracks, own_s, strict=True):
+            frames = track.known & (start_s <= times_s) & (times_s <= end_s)
+            values = np.delete(track.values[:, frames], self.blank_bins, axis=0)
+            # Their frames are of other lengths.
+            parts.append(values.sum(axis=1) / max(np.count_nonzero(frames), 1))
+        return matching_gain(*parts)
 
     def set_wanted(self, wanted: bool) -> None:
         """Show or hide it, and store the choice."""
         if wanted != self.wanted:
             self.wanted = wanted
             self._session.settings.set_value(_SHOWN, wanted)
-            self._follow()
+            self.changed.emit()
 
     def full_scale(self, levels: HeatmapLevels) -> tuple[float, str]:
         """Difference that has the strongest colour, and its unit."""
