@@ -58,7 +58,8 @@ class AccuracyModel(ReportingModel):
         self._settings = settings
         self._library = library
         self.measured = MeasuredModel(jobs, library, self)
-        self.measured.changed.connect(self._follow_measured)
+        for signal in (self.plan_changed, self.changed):  # figures of the plan in use
+            self.measured.changed.connect(signal)
         self.measured.failed.connect(self.failed)
         self.tolerance = settings.tolerance  # relative L1 after smoothing that the user accepts
         self._scene: tuple[MeshSequence, SynthesisOptions] | None = None
@@ -72,11 +73,9 @@ class AccuracyModel(ReportingModel):
         self.choice: Choice | None = None  # newest by tolerance; its place may be the one before
         self._chosen_at: VirtualSensor | None = None
         self._dragging: Choice | None = None
-        self._decided_for: _Request | None = None
-        self._asking: _Request | None = None
+        self._asked: _Request | None = None  # that is decided, or being chosen for
         self._survey: Survey | None = None  # the last, which later ones of this clip build on
         self._clicked: PlanResult | None = None
-        self._clicked_elsewhere = False
         self._body: tuple[float | None, bool] = (None, False)  # its share, and if it is pending
 
     # --- what is known --------------------------------------------------------------------
@@ -89,11 +88,13 @@ class AccuracyModel(ReportingModel):
     @property
     def in_use(self) -> InUse | None:
         """The plan at rest; None until the first choice."""
-        if (result := self._clicked) is None:
-            elsewhere = self._asking is not None and self._asking.sensor != self._chosen_at
+        if self._clicked is None:
+            elsewhere = self._asked is not None and self._asked.sensor != self._chosen_at
             return self._of_choice(self.choice, elsewhere=elsewhere)
-        cost_ms, elsewhere = result.cost.all_cores_ms.median, self._clicked_elsewhere
-        return InUse(result.plan, result.errors.l1, cost_ms, True, elsewhere, *self._body)
+        here = self._measured_here(self._clicked.plan)
+        result = here or self._clicked
+        cost_ms = result.cost.all_cores_ms.median
+        return InUse(result.plan, result.errors.l1, cost_ms, True, here is None, *self._body)
 
     @property
     def while_dragging(self) -> InUse | None:
@@ -142,7 +143,7 @@ class AccuracyModel(ReportingModel):
 
     def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
         """True if the plans were chosen for this sensor, budget and tolerance."""
-        return self._decided_for == self._request(sensor, budget_ms)
+        return self._asked == self._request(sensor, budget_ms) and not self.choosing
 
     def _request(self, sensor: VirtualSensor, budget_ms: float) -> _Request:
         return _Request(None if self._clicked else self.tolerance, budget_ms, sensor)
@@ -165,18 +166,16 @@ class AccuracyModel(ReportingModel):
             return
         self.hold()
         self._scene = mesh, self._scene[1]
-        self._decided_for = self._asking = None
+        self._asked = None
         self.measured.attach(*self._scene)
         self.changed.emit()
 
     def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
         """Choose for the sensor at rest, and for a drag from there at ``budget_ms`` per frame."""
         request = self._request(sensor, budget_ms)
-        if self._scene is None or request == self._decided_for:
+        if self._scene is None or request == self._asked:
             return
-        if self.choosing and request == self._asking:
-            return
-        self._asking = request
+        self._asked = request
         mesh, options = self._scene
         self._runner.submit(
             lambda emit: self._compute(mesh, options, request, emit),
@@ -185,6 +184,8 @@ class AccuracyModel(ReportingModel):
 
     def hold(self) -> None:
         """Stop choosing, which frees the processor for the moving sensor."""
+        if self.choosing:
+            self._asked = None
         self._runner.cancel()
 
     def set_tolerance(self, tolerance: float) -> None:
@@ -228,7 +229,6 @@ class AccuracyModel(ReportingModel):
             return
         self.hold()
         self._clicked = result
-        self._clicked_elsewhere = self._measured_here(result.plan) is None
         self.plan_changed.emit()
         self.changed.emit()
 
@@ -270,7 +270,7 @@ class AccuracyModel(ReportingModel):
         """Use a plan that is chosen."""
         before = self.in_use, self.while_dragging
         if choice.tolerance is not None:
-            self.choice, self._chosen_at = choice, self._asking and self._asking.sensor
+            self.choice, self._chosen_at = choice, self._asked and self._asked.sensor
         else:
             self._dragging = choice
         if before != (self.in_use, self.while_dragging):
@@ -279,7 +279,6 @@ class AccuracyModel(ReportingModel):
 
     def _decide(self, choice: Choice | None = None) -> None:
         """End a choice, which is the last of a wish: the same place is not asked for again."""
-        self._decided_for = self._asking
         if choice is not None:
             self._take(choice)
         else:
@@ -289,13 +288,3 @@ class AccuracyModel(ReportingModel):
     def _fail(self, error: Exception) -> None:
         self._decide()
         super()._fail(error)
-
-    def _follow_measured(self) -> None:
-        """Keep the plan of a clicked point, with figures for this sensor once measured."""
-        before = self.in_use
-        if self._clicked is not None:
-            here = self._measured_here(self._clicked.plan)
-            self._clicked, self._clicked_elsewhere = here or self._clicked, here is None
-        if self.in_use != before:
-            self.plan_changed.emit()
-        self.changed.emit()
