@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import itertools
 import math
 import threading
 from collections import deque
@@ -18,18 +19,17 @@ from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel, delayed
-from sd2app.maps.partial_map import FINAL, PREVIEW, Part, PartialMap, View, empty_map
+from sd2app.maps.partial_map import FINAL, PREVIEW, Part, PartialMap, View, empty_map, pieces
 from sd2app.maps.quality import (
     ALL_WORDS,
     AT_ONCE,
     ROUGH_WORDS,
     Compiler,
-    Level,
     Postprocess,
+    Request,
     SynthesizerCache,
     budget_ms,
     final_words,
-    refine,
 )
 from sd2app.maps.readout import FrameReader, Readout
 from sd2app.session.content import UNTITLED, folder_for_command
@@ -117,7 +117,7 @@ class SynthesisModel(ReportingModel):
         # The mesh of the plan for dragging, and its masks from where the sensor rests.
         self._prefetcher = LatestRunner("ready", self, self._note_masks, super()._fail)
         # Asked for by the window and taken by the thread.
-        self._next_sweep: deque[tuple[Callable[..., Part], Postprocess | None]] = deque(maxlen=1)
+        self._next_sweep: deque[tuple[Callable[[Emit], Part], Postprocess | None]] = deque(maxlen=1)
         self._woken = threading.Event()  # by another sweep, or the end of what is made of one
         self._forget()
         self._runner = ListedRunner("synthesis", session.jobs, self, self._finish, self._fail)
@@ -393,9 +393,8 @@ class SynthesisModel(ReportingModel):
     def _sweep(self) -> None:
         """Ask for a rough pass for the sensor where it is now, after the one under way."""
         assert self._synthesizers is not None
-        part, wanted = self._synthesizers.part, (self._preview(), *self._swept())
-        sensor = self._sensor
-        self._next_sweep.append((lambda emit: part(sensor, emit, *wanted), self.postprocess()))
+        sweep = functools.partial(self._synthesizers.part, self._preview(), self._swept())
+        self._next_sweep.append((sweep, self.postprocess()))
         self._woken.set()
         if not (self._sweeping and self._runner.busy):
             self._sweeping = True
@@ -419,7 +418,7 @@ class SynthesisModel(ReportingModel):
                         return before.result()
                     self._woken.wait()
                     continue
-                part = sweep(lambda: emit(None))
+                part = sweep(emit)
                 before.result()
                 before = beside.submit(more_of, part, postprocess)
                 before.add_done_callback(lambda _: self._woken.set())
@@ -448,17 +447,22 @@ class SynthesisModel(ReportingModel):
             return
         self.refining.emit()
         start, stop = self.frames_in_view()
-        stretches, levels, size = [(start, stop)], [self._preview()], self._at_once
+        stretches, requests, size = [(start, stop)], [self._preview()], self._at_once
         # Much of a long clip can wait until it is known how it is to be done.
         if final is not None or self._compiler.busy or self._is_short:
             stretches += [(stop, self._partial.frames), (0, start)]
         if final is not None:
-            levels.append(final)
-        part = self._synthesizers.part
+            requests.append(final)
+        synthesizers = self._synthesizers
 
         def work(emit: Emit) -> None:
-            compute = functools.partial(part, sensor, lambda: emit(None))
-            refine(compute, quality, stretches, levels, size, emit)
+            done, total = 0, int((quality < FINAL).sum())
+            for stretch, request in itertools.product(stretches, requests):
+                for frames in pieces(quality < request.quality, *stretch, size):
+                    emit(synthesizers.part(request, frames, emit))
+                    if request is final:
+                        done += frames[1] - frames[0]
+                        emit((done, total))
 
         self._runner.submit(work, "Synthesising the map" if final is not None else "")
 
@@ -471,9 +475,10 @@ class SynthesisModel(ReportingModel):
         elif not self.complete:
             self._settle()
         elif self._dragging_plan is not None and self._masks_of != self._sensor:
-            part, sensor = self._synthesizers.part, self._sensor
-            wanted = (Level(self._dragging_plan, PREVIEW, ""), *self._swept())
-            self._prefetcher.submit(lambda emit: part(sensor, lambda: emit(None), *wanted))
+            masks = Request(self._sensor, self._dragging_plan, PREVIEW, "")
+            self._prefetcher.submit(
+                functools.partial(self._synthesizers.part, masks, self._swept())
+            )
 
     def _may_choose(self) -> bool:
         """True if the plans are for another sensor and the kernels are compiled."""
@@ -529,10 +534,10 @@ class SynthesisModel(ReportingModel):
         if (part := self._partial.kept()) is not None:
             self._session.results.put(part.key, part, part.size_bytes)
 
-    def _restore(self, final: Level) -> None:
+    def _restore(self, final: Request) -> None:
         """Show the final map if it was made before, with the same sensor, plan and options."""
         assert self._synthesizers is not None
-        part = self._session.results.get(self._synthesizers.key(final.plan, self._sensor))
+        part = self._session.results.get(self._synthesizers.key(final.plan, final.sensor))
         if part is not None and not self.complete:
             self._take(part)
 
@@ -558,34 +563,35 @@ class SynthesisModel(ReportingModel):
 
     # --- helpers --------------------------------------------------------------------------
 
-    def _preview(self) -> Level:
+    def _preview(self) -> Request:
         """Quality for what moves, and where no frame is computed yet."""
         assert self._synthesizers is not None
         synthesizers, dragging = self._synthesizers, self._accuracy.while_dragging
+        here = self._sensor
         if dragging is not None and synthesizers.ready(dragging.plan):
             plan, words = dragging.plan, f"while dragging: {dragging.accuracy}"
             if plan.mask_reuse_m == 0:
-                return Level(plan, PREVIEW, words)
-            masks_of, here_m = self._masks_of, self._sensor.position_m
-            if masks_of and math.dist(masks_of.position_m, here_m) <= plan.mask_reuse_m:
-                return Level(plan, PREVIEW, words, "frozen")
+                return Request(here, plan, PREVIEW, words)
+            known = self._masks_of
+            if known and math.dist(known.position_m, here.position_m) <= plan.mask_reuse_m:
+                return Request(here, plan, PREVIEW, words, "frozen")
         # The masks of rest serve until one for dragging is known.
         newest = self._plan if synthesizers.ready(self._plan) else None
         if synthesizers.options.visibility == "none":
-            return Level(newest, PREVIEW, ALL_WORDS, "none")
+            return Request(here, newest, PREVIEW, ALL_WORDS, "none")
         # Where the sensor stays, and things move, they are as good.
         if dragging is not None and not self.shows_sensor:
-            return Level(newest, PREVIEW, ROUGH_WORDS, "facing")
-        return Level(newest, PREVIEW, "preview: visibility of the nearest place", "frozen")
+            return Request(here, newest, PREVIEW, ROUGH_WORDS, "facing")
+        return Request(here, newest, PREVIEW, "preview: visibility of the nearest place", "frozen")
 
-    def _final(self) -> Level | None:
+    def _final(self) -> Request | None:
         """Quality that the tolerance asks for; None until it is chosen."""
         if self._synthesizers is None or self._compiler.busy:
             return None
         if self._plan is None and self._may_choose():
             return None
         words = final_words(self._synthesizers, self._accuracy.in_use)
-        return Level(self._plan, FINAL, words)
+        return Request(self._sensor, self._plan, FINAL, words)
 
     @property
     def _files(self) -> str:

@@ -7,16 +7,15 @@ import math
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sd2app.accuracy.measurements import InUse
 from sd2app.background.latest import Emit
-from sd2app.maps.partial_map import FINAL, Part, View, pieces
+from sd2app.maps.partial_map import FINAL, Part, View
 from sd2app.session.tasks import ListedRunner
 from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
@@ -113,41 +112,25 @@ class SynthesizerCache:
                 self._made.popitem(last=False)
         return synthesizer
 
-    def part(
-        self,
-        sensor: VirtualSensor,
-        proceed: Callable[[], None],
-        level: Level,
-        start: int,
-        stop: int,
-    ) -> Part:
-        """Frames ``start`` to ``stop``, split by the parts of the body where that is wanted.
-
-        Parameters
-        ----------
-        sensor : VirtualSensor
-        proceed : callable
-            Called in between, and may raise to stop.
-        level : Level
-        start, stop : int
-        """
+    def part(self, request: Request, frames: View, emit: Emit) -> Part:
+        """Frames that are asked for, split by the parts of the body where that is wanted."""
         # A sweep does not wait while the synthesizer of another plan is being made.
-        synthesizer = self.ready(level.plan) or self.of(level.plan)
+        synthesizer = self.ready(request.plan) or self.of(request.plan)
         parts = body_parts(synthesizer.mesh) if self.limbs else None
-        final = level.quality == FINAL
+        final = request.quality == FINAL
         made = synthesizer.stretch(
-            sensor, start, stop, level.visibility, lambda *_: proceed(), parts,
+            request.sensor, *frames, request.visibility, lambda *_: emit(None), parts,
             shares=final,  # which a map that is exported names
         )  # fmt: skip
         shares = None
         if made.visible_share is not None and made.beyond_share is not None:
             shares = np.stack([made.visible_share, made.beyond_share])
         # Where no mask is kept.
-        rough = level.visibility == "frozen" and made.quality == "facing"
+        rough = request.visibility == "frozen" and made.quality == "facing"
         return Part(
-            sensor, start, made.values, made.limbs, level.quality,
-            ROUGH_WORDS if rough else level.words, synthesizer.unit,
-            self.key(level.plan, sensor) if final else None, shares,
+            request.sensor, frames[0], made.values, made.limbs, request.quality,
+            ROUGH_WORDS if rough else request.words, synthesizer.unit,
+            self.key(request.plan, request.sensor) if final else None, shares,
         )  # fmt: skip
 
     def ready(self, plan: AccuracyPlan | None) -> Synthesizer | None:
@@ -166,9 +149,10 @@ def _key(plan: AccuracyPlan) -> AccuracyPlan:
     return replace(plan, mask_reuse_m=0.0)
 
 
-class Level(NamedTuple):
-    """With what frames are computed."""
+class Request(NamedTuple):
+    """For which placement frames are computed, and how."""
 
+    sensor: VirtualSensor
     plan: AccuracyPlan | None  # of the synthesizer
     quality: int  # rank of the computed frames
     words: str  # the same for people
@@ -186,41 +170,6 @@ def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
     if in_use is not None:
         return in_use.accuracy
     return ALL_WORDS if synthesizers.options.visibility == "none" else "exact visibility"
-
-
-def refine(
-    compute: Callable[[Level, int, int], Part],
-    quality: NDArray[np.uint8],
-    stretches: Iterable[View],
-    levels: Sequence[Level],
-    size: int,
-    emit: Emit,
-) -> None:
-    """Raise the quality of the frames of each stretch, by one level after another.
-
-    Parameters
-    ----------
-    compute : callable
-        Gives the :class:`Part` from a frame to another.
-    quality : ndarray of uint8, shape (T,)
-        Ranks that the frames have.
-    stretches : iterable of View
-        The most urgent first.
-    levels : sequence of Level
-        The last is final, or there is none yet.
-    size : int
-        Frames that are computed at once.
-    emit : callable
-        Takes each part and, of final ones, ``(done, total)`` frames; raises to stop.
-    """
-    done, total = 0, int((quality < FINAL).sum())
-    for stretch in stretches:
-        for level in levels:
-            for start, stop in pieces(quality < level.quality, *stretch, size):
-                emit(compute(level, start, stop))
-                if level.quality == FINAL:
-                    done += stop - start
-                    emit((done, total))
 
 
 _POLL_S = 0.2
