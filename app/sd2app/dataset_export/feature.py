@@ -209,7 +209,7 @@ class ExportDialog(Dialog):
             self._splits.setText(split_words(forecast))
         left_out = [] if forecast is None else list(forecast.failed)
         if model.result is not None:
-            left_out = list(model.result.left_out)
+            left_out = list(model.result.failed)
         messages = [model.problem, *(f"Left out: {one}" for one in left_out)]
         show_words(self._message, "\n".join(filter(None, messages)))
 
@@ -229,10 +229,10 @@ class ExportDialog(Dialog):
         self._open.setVisible(written)
         if written and result is not None:
             self._size.setText(
-                f"{result.segments:,} segments are in {result.path.name}, with a card"
+                f"{result.segments:,} segments are in {result.dataset.name}, with a card"
                 f" ({result.card.name}) and this sheet:"
             )
-            self._size.setToolTip(str(result.path))
+            self._size.setToolTip(str(result.dataset))
             self._show_sheet(result.sheet)
         elif not self._picture.pixmap().isNull():
             self._picture.clear()
@@ -285,7 +285,7 @@ class ExportDialog(Dialog):
     def _show_folder(self) -> None:
         result = self._model.result
         if result is not None:
-            show_in_files(result.path.absolute().parent)
+            show_in_files(result.dataset.absolute().parent)
 
 
 def size_words(forecast: Forecast, length: int) -> str:

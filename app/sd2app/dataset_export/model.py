@@ -50,14 +50,17 @@ class _Counted(NamedTuple):
 
 @dataclass(frozen=True)
 class Exported:
-    """A finished data set."""
+    """A finished data set, as the last line of ``sd2 export --progress-json`` describes it."""
 
-    path: Path
+    dataset: Path
     card: Path
     sheet: Path
     segments: int
     sources: int
-    left_out: tuple[str, ...] = ()  # sources that could not be made, each with its reason
+    failed: tuple[str, ...]  # sources that could not be made, each with its reason
+
+
+_CHOICE, _WRITTEN = TypeAdapter(Export), TypeAdapter(Exported)
 
 
 class ExportHistory(History):
@@ -66,14 +69,7 @@ class ExportHistory(History):
     written: Exported | None = None
 
     def _take_done(self, event: dict[str, Any]) -> None:
-        self.written = Exported(
-            Path(event["dataset"]),
-            Path(event["card"]),
-            Path(event["sheet"]),
-            int(event["segments"]),
-            int(event["sources"]),
-            tuple(map(str, event["failed"])),
-        )
+        self.written = _WRITTEN.validate_python(event)
 
 
 class ExportRun(CommandRun):
@@ -194,15 +190,11 @@ class ExportModel(Runs[ExportRun]):
         if not self.ready:
             return
         command = replace(self.command(out), progress_json=True)
-        choice = TypeAdapter(Export).dump_python(self.choice, mode="json")
+        choice = _CHOICE.dump_python(self.choice, mode="json")
         about = {"what": "export", "out": str(out), "choice": choice}
         path = free_folder(self._folder, "export", [out])
-        try:
-            self.start_command(path, words_of("export", command), **about)
-        except (Sd2Error, OSError) as error:
-            self.failed.emit(str(error))
-            return
         self.result = None
+        self._attempt(lambda: self.start_command(path, words_of("export", command), **about))
         self.changed.emit()
 
     # --- following ------------------------------------------------------------------------
@@ -218,7 +210,7 @@ class ExportModel(Runs[ExportRun]):
             return
         run = ExportRun(one.path, self)
         try:
-            self.choice = TypeAdapter(Export).validate_json(json.dumps(run.about.get("choice")))
+            self.choice = _CHOICE.validate_json(json.dumps(run.about.get("choice")))
         except ValueError:
             pass  # of another version: it is followed all the same
         else:
@@ -250,9 +242,9 @@ class ExportModel(Runs[ExportRun]):
         self.result = result = run.history.written
         if result is not None:
             what, views = counted(result.segments, "segment"), counted(result.sources, "view")
-            self.noted.emit(f"{what} from {views} are in {result.path}.")
-            if result.left_out:
-                self.failed.emit("\n".join(f"Left out: {one}" for one in result.left_out))
+            self.noted.emit(f"{what} from {views} are in {result.dataset}.")
+            if result.failed:
+                self.failed.emit("\n".join(f"Left out: {one}" for one in result.failed))
         elif run.phase == "died":
             self.failed.emit(
                 f"{run.out.name} was not written to its end: its process is gone. Export it again;"
