@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.latest import LatestRunner, delayed
+from sd2app.background.latest import LatestRunner
 from sd2app.background.runs import Runs
 from sd2app.batch.run import BatchMonitor, BatchResults, plan_of
 from sd2app.batch.setup import BatchSetupModel
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     # Imported where it is used: it takes long to load, and the window starts without.
     from sd2core.batch.estimate import BatchEstimate
     from sd2core.batch.plan import BatchPlan
-
-
-_ESTIMATE_MS = 600
 
 
 class BatchModel(Runs[BatchMonitor]):
@@ -54,9 +51,7 @@ class BatchModel(Runs[BatchMonitor]):
         self._estimating = LatestRunner("estimate", self, take, refuse)
         self.follow_setup(self.setup)
         self.results.changed.connect(self.changed)
-        # Not while the user still changes a number.
-        self._patience = delayed(self._estimate_if_seen, _ESTIMATE_MS, self)
-        self.changed.connect(self._patience.start)
+        self.changed.connect(self._estimate_if_seen)
 
     # --- the set-up -------------------------------------------------------------------------
 

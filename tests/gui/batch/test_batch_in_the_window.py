@@ -26,7 +26,6 @@ from PySide6.QtWidgets import (
 from window_models import models_of
 
 from sd2app.background import run_monitor
-from sd2app.batch import model as batch_model
 from sd2app.batch import questions
 from sd2app.batch.feature import BatchWindow
 from sd2app.batch.model import BatchModel
@@ -50,7 +49,6 @@ def quick(monkeypatch) -> None:
     """Look more often than a person would."""
     monkeypatch.setattr(run_monitor, "POLL_MS", 40)
     monkeypatch.setattr(run_monitor, "SLOW_POLL_MS", 40)
-    monkeypatch.setattr(batch_model, "_ESTIMATE_MS", 20)
 
 
 @pytest.fixture
