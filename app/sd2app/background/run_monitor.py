@@ -32,8 +32,7 @@ UNDER_WAY: tuple[Phase, ...] = (
 POLL_MS = 250
 SLOW_POLL_MS = 1000
 """Interval for paused or ended runs, which may be resumed or deleted elsewhere."""
-_ASK_AGAIN_S = 15.0
-_GIVE_UP_S = 30.0
+_CANCEL_PATIENCE_S = 30.0
 """After that a process that does not react to its cancellation is killed."""
 _CLOSING_S = 10.0
 """A killed process is gone at once, unless the machine is busy."""
@@ -305,11 +304,10 @@ class RunMonitor(ClosingModel, Generic[F]):
         process = status.process if status.live else self._launched
         if process is None:
             return
-        waited_s, patience_s = self._clock_s() - self._asked_s, self.stop_patience_s
-        if self._request == "stop" and patience_s is not None and waited_s > patience_s:
+        patiences_s = {"stop": self.stop_patience_s, "cancel": _CANCEL_PATIENCE_S}
+        patience_s = patiences_s.get(self._request or "")
+        if patience_s is not None and self._clock_s() - self._asked_s > patience_s:
             process.terminate(at_once=True)
-        elif self._request == "cancel" and waited_s > _ASK_AGAIN_S:
-            process.terminate(at_once=waited_s > _GIVE_UP_S)
 
     def _settle(self) -> None:
         """Take over another phase."""

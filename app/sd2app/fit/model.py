@@ -38,7 +38,6 @@ _UNKNOWN_WEIGHT = 0.5
 _SETTLING_S = 2.0
 """Shortest time from which the rest is estimated."""
 _POLL_MS = 100
-_PATIENCE_S = 3.0
 
 
 class FitProgress(History):
@@ -139,7 +138,7 @@ class FitRun(CommandRun):
     histories = FitProgress
     history: FitProgress
     poll_ms = _POLL_MS
-    stop_patience_s = _PATIENCE_S
+    stop_patience_s = 3.0
 
 
 UNFINISHED = "unfinished_fit"

@@ -198,8 +198,6 @@ class TrainingModel(Runs[TrainingMonitor]):
 
     def start(self) -> None:
         """Begin as set up; Sd2Error if it cannot start, OSError if its folder cannot be made."""
-        if self.why_not_start:
-            raise Sd2Error(self.why_not_start)
         config = self.setup.config
         self._folder.mkdir(parents=True, exist_ok=True)
         path = _new_run(self._folder, config)
@@ -208,13 +206,12 @@ class TrainingModel(Runs[TrainingMonitor]):
     def resume(self) -> None:
         """Go on with the run in view where it ended; raises what :meth:`start` does."""
         run = self.run
-        if run is None or run.under_way:
-            return
-        if self.busy:
-            raise Sd2Error(self.busy)
-        self._launch(run.path, ["train", "--resume", str(run.path)])
+        if run is not None and not run.under_way:
+            self._launch(run.path, ["train", "--resume", str(run.path)])
 
     def _launch(self, path: Path, arguments: list[str]) -> None:
+        if self.busy:
+            raise Sd2Error(self.busy)
         # What moves on the screen comes first: the training gets by with one processor.
         words = [*self._command, *arguments]
         self.follow_new(path, launch(words, TrainingFolder(path).output, ONE_THREAD))
