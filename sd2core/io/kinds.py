@@ -12,6 +12,7 @@ from sd2core.files.limits import check_regular
 from sd2core.files.numpy_files import npz_names
 from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.stores import read_attributes
+from sd2core.files.texts import reading_as
 from sd2core.io.estimator_files import files_of_people, holds_bodies
 from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.io.mesh_files import MOTION_SUFFIXES
@@ -171,10 +172,6 @@ def _may_be_of_a_person(path: Path) -> bool:
 
 
 def _is_doppler_map(path: Path) -> bool:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return "velocity_mps.npy" in archive.namelist()
-    except (OSError, zipfile.BadZipFile) as error:
-        raise Sd2Error(
-            f"{path} is not a readable .npz ({error})", "an .npz written by NumPy or SD² Studio"
-        ) from error
+    expected = "an .npz written by NumPy or SD² Studio"
+    with reading_as(".npz", path, expected), zipfile.ZipFile(path) as archive:
+        return "velocity_mps.npy" in archive.namelist()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import warnings
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_size
 from sd2core.files.numpy_files import open_zip
+from sd2core.files.texts import reading_as
 from sd2core.io.body_model import check_frames
 from sd2core.progress import Progress, silent
 
@@ -104,16 +104,12 @@ def _loaded(path: Path) -> Any:
     """The program of a file, if it does nothing but compute."""
     if path.suffix.lower() not in RIG_SUFFIXES or not path.is_file():
         raise Sd2Error(f"{path} is no model of MHR", _EXPECTED, _REMEDY)
-    try:
-        with open_zip(path) as archive:
-            size = path.stat().st_size
-            texts = [one for one in archive.infolist() if one.filename.endswith(".py")]
-            check_size(path, sum(one.file_size for one in texts), size)
-            if not any("/code/" in one.filename for one in texts):
-                raise Sd2Error(f"{path} is no program of torch", _EXPECTED, _REMEDY)
-            matches = [_REACHES_OUT.search(archive.read(one).decode()) for one in texts]
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise Sd2Error(f"{path} is no model of MHR ({error})", _EXPECTED, _REMEDY) from error
+    with reading_as("a model of MHR", path, _EXPECTED, _REMEDY), open_zip(path) as archive:
+        texts = [one for one in archive.infolist() if one.filename.endswith(".py")]
+        check_size(path, sum(one.file_size for one in texts), path.stat().st_size)
+        if not any("/code/" in one.filename for one in texts):
+            raise Sd2Error(f"{path} is no program of torch", _EXPECTED, _REMEDY)
+        matches = [_REACHES_OUT.search(archive.read(one).decode()) for one in texts]
     calls = sorted({one[0] for one in matches if one is not None})
     if calls:
         raise Sd2Error(

@@ -77,12 +77,6 @@ class LimitedFile:
             raise EOFError("the file ends inside an array")
         return content
 
-    def readinto(self, buffer: Any) -> int:
-        """Fill ``buffer`` as far as the file goes."""
-        content = self._upto(len(buffer))
-        buffer[: len(content)] = content
-        return len(content)
-
     def readline(self) -> bytes:
         """Read up to the next line break."""
         self._count()

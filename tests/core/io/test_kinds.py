@@ -99,7 +99,7 @@ def test_what_is_nothing_known_is_explained(tmp_path):
         ("notes.txt", "is of no kind that is known"),
         ("nothing.csv", "is empty"),
         ("missing.mp4", "does not exist"),
-        ("bad.npz", "is not a readable .npz"),
+        ("bad.npz", "cannot be read as .npz"),
         ("empty", "holds nothing that is known"),
         ("maps", f"`sd2 info {tmp_path / 'maps' / '1.npz'}`"),
     ):

@@ -138,7 +138,7 @@ def test_other_files_and_other_calls_are_named(tmp_path: Path, model: Path) -> N
     for name, reason in (
         ("weights.pt", "no program"),
         ("SMPL.npz", "no model of MHR"),
-        ("cut.pt", "no model of MHR"),
+        ("cut.pt", "cannot be read as a model of MHR"),
         ("other.pt", "makes no vertices"),
         ("none.pt", "no model of MHR"),
     ):

@@ -472,7 +472,7 @@ def test_a_point_cloud_counts_every_point(empty_window, fake, tmp_path, qtbot):
     [
         ("missing.mp4", None, "does not exist"),
         ("broken.mp4", b"not a video", "broken.mp4"),
-        ("broken.npz", b"not an archive", "not a readable .npz"),
+        ("broken.npz", b"not an archive", "cannot be read as .npz"),
         ("notes.txt", b"hello", "is of no kind that is known"),
     ],
 )
