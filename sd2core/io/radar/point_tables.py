@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +101,7 @@ class Table:
 
     names: tuple[str, ...] = ()
     width: int
-    frame: Any = None  # of arrays by frame: gives the number of every point's frame
+    by_frame = False  # then the numbers of the points' frames are one more column, the last
 
     def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
         """Columns at some places, of the first rows or all."""
@@ -169,30 +167,19 @@ class _Array(Table):
             not fields and stored.dtype.kind not in "iuf"
         ):
             raise Sd2Error(f"{path} is of {stored.dtype}", "real numbers")
-        self._by_frame = dimensions == 3
-        if self._by_frame:
-            self.frame = lambda: self._whole[1]
+        self.by_frame = dimensions == 3
 
-    @cached_property
-    def _whole(self) -> tuple[NDArray[Any], NDArray[np.float64]]:
-        return self._filled(None)
-
-    def _filled(self, most: int | None) -> tuple[NDArray[Any], NDArray[np.float64]]:
-        """Points of the first rows or all, (P, columns), and their frames; no rows of zeros."""
+    def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
+        if most is not None and self.by_frame:
+            most = -(-most // self._stored.shape[1])
         values = np.asarray(self._stored.read((slice(0, most),)))
         if values.dtype.names:
             values = np.stack([values[name].astype(np.float64) for name in values.dtype.names], -1)
         values = values.astype(np.float64)
-        filled = np.ones(len(values), bool)
-        if self._by_frame:
-            filled = np.asarray(values.any(axis=-1))
-        return values[filled], np.nonzero(filled)[0].astype(np.float64)
-
-    def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
-        if most is not None and self._by_frame:
-            most = -(-most // self._stored.shape[1])
-        rows = (self._whole if most is None else self._filled(most))[0]
-        return [np.ascontiguousarray(rows[:, place]) for place in places]
+        if self.by_frame:  # rows of zeros fill up their frames
+            filled = values.any(axis=-1)
+            values = np.column_stack([values[filled], np.nonzero(filled)[0]])
+        return [np.ascontiguousarray(values[:, place]) for place in places]
 
 
 class _Vectors(Table):

@@ -148,19 +148,19 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
             f"{path} has {table.width} columns, its description {len(columns)}", "as many"
         )
     places = {name: place for place, name in enumerate(columns) if name in COLUMNS}
+    if table.by_frame:
+        places["frame"] = table.width
     try:
         numbers = dict(zip(places, table.read(tuple(places.values())), strict=True))
     except Sd2Error:
         if "time" not in places or not isinstance(table, TextTable):
             raise
         numbers = _with_dates(table, places)
-    if table.frame is not None:
-        numbers["frame"] = table.frame()
     finite = np.isfinite(numbers["doppler"])
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
         raise Sd2Error(f"{path}: the velocity of row {row + 1} is no number", "a finite number")
-    titles = {name: table.names[place] for name, place in places.items() if table.names}
+    titles = {columns[place]: title for place, title in enumerate(table.names)}
     numbers["doppler"] *= speed_unit_mps(path, titles.get("doppler", ""))
     if is_in_decibels(titles.get("intensity", "")):
         with np.errstate(over="ignore"):
@@ -250,7 +250,7 @@ LONGEST_GAP_FRAMES = 10
 def _recognised(table: Table) -> tuple[tuple[str, ...], bool] | None:
     """Columns in order, and True if by their numbers; None where they are not known."""
     if table.names:
-        named = named_columns(table.names, framed=table.frame is not None)
+        named = named_columns(table.names, framed=table.by_frame)
         return None if named is None else (named, False)
     guessed = _by_numbers(table)
     return None if guessed is None else (guessed, True)
@@ -265,7 +265,7 @@ def _by_numbers(table: Table) -> tuple[str, ...] | None:
     if not columns or len(columns[0]) < 20 or not all(np.isfinite(one).all() for one in columns):
         return None
     names: dict[int, str] = {}
-    if table.frame is None:
+    if not table.by_frame:
         frames = [place for place, one in enumerate(columns) if _is_frame(one)]
         if len(frames) != 1:
             return None
