@@ -25,7 +25,6 @@ from sd2core.files.limits import read_limit_bytes
 _HEADER = struct.Struct("<4B3I")  # versions, flags, typesize; bytes decoded, per block, encoded
 _SLACK_BYTES = 4096
 """By which a codec before it may have lengthened a chunk, a checksum for example."""
-_PIECE_BYTES = 2**20
 _ZSTD_BLOCK_BYTES = 2**17
 """What a compressed block of zstd decodes to at most."""
 
@@ -87,11 +86,9 @@ def check_deflated(chunk: Any, most_bytes: int) -> None:
     made = 0
     while left:  # One member of gzip after the other.
         decoder = zlib.decompressobj(zlib.MAX_WBITS | 32)
-        while left and not decoder.eof:
-            made += len(decoder.decompress(left, _PIECE_BYTES))
-            left = decoder.unconsumed_tail
-            if made > most_bytes:
-                raise DamagedChunkError(f"it decodes to more than {most_bytes} bytes")
+        made += len(decoder.decompress(left, most_bytes - made + 1))
+        if made > most_bytes:
+            raise DamagedChunkError(f"it decodes to more than {most_bytes} bytes")
         left = decoder.unused_data
 
 
