@@ -94,6 +94,13 @@ def check_regular(path: Path) -> None:
         )
 
 
+def check_there(path: Path, expected: str) -> None:
+    """Raise Sd2Error if there is nothing at a path, or what :func:`check_regular` refuses."""
+    if not path.exists():
+        raise Sd2Error(f"{path} does not exist", expected, "Check the path")
+    check_regular(path)
+
+
 def check_fetched(path: Path | None) -> None:
     """Raise Sd2Error if a file is a pointer of Git LFS, or a web page."""
     if path is None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular, check_size
+from sd2core.files.limits import check_regular, check_size, check_there
 from sd2core.files.numpy_files import open_npy_file, open_npz_file
 from sd2core.files.paths import files_of_pattern
 from sd2core.files.texts import reading_as
@@ -151,11 +151,7 @@ def _declared_bytes_of_glb(content: bytes) -> int:
 
 def read_faces(path: Path) -> NDArray[Any]:
     """Read triangles of a ``.npy``, ``.npz`` or mesh file; Sd2Error if it has none."""
-    check_regular(path)
-    if not path.is_file():
-        raise Sd2Error(
-            f"The faces file {path} does not exist", "a .npy, .npz or .obj file", "Check the path"
-        )
+    check_there(path, "a file of faces: .npy, .npz or .obj")
     suffix = path.suffix.lower()
     if suffix in SURFACE_SUFFIXES:
         faces = read_surface(path)[1]

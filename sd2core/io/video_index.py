@@ -22,7 +22,7 @@ from av.error import FFmpegError
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import check_there
 from sd2core.progress import Progress, silent
 
 _WHOLE_MEGAPIXELS = 100.0
@@ -72,9 +72,7 @@ def open_stream(path: Path) -> tuple[Any, Any]:
 
     Raises Sd2Error if the file is missing, is no video or holds no moving picture.
     """
-    if not path.exists():
-        raise Sd2Error(f"{path} does not exist", "a video file", "Check the path")
-    check_regular(path)
+    check_there(path, "a video file")
     if path.is_dir():
         raise Sd2Error(f"{path} is a folder", "a video file", "Name the file in it")
     try:

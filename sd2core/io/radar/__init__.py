@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import open_hdf5_file
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import check_there
 from sd2core.files.paths import as_path
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES
 from sd2core.io.radar import dca1000
@@ -96,9 +96,7 @@ def load_capture(path: Path | str) -> RadarCapture:
     (True, (450, 3, 64, 32))
     """
     path = as_path(path).expanduser()
-    if not path.exists():
-        raise Sd2Error(f"{path} does not exist", SUPPORTED, "Check the path")
-    check_regular(path)
+    check_there(path, SUPPORTED)
     for reader in _READERS:
         if reader.fits(path):
             capture = reader.read(path)

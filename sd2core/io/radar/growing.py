@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import check_there
 from sd2core.files.numpy_files import read_words
 from sd2core.files.texts import errors_in, faults_in, read_json
 from sd2core.io.radar.capture import LazySamples, RadarCapture
@@ -158,9 +158,7 @@ def frame_count(folder: Path, head: GrowingHead) -> int:
     sizes = []
     for name in (SAMPLES_NAME, INDEX_NAME):
         path = folder / name
-        check_regular(path)
-        if not path.is_file():
-            raise Sd2Error(f"There is no file {path}", _EXPECTED, "Copy the whole folder")
+        check_there(path, _EXPECTED)
         sizes.append(path.stat().st_size)
     return min(sizes[0] // head.frame_bytes, sizes[1] // ENTRY.itemsize)
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import check_there
 from sd2core.labels.label_set import LONGEST_NAME, Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
@@ -74,10 +74,8 @@ def load_kkt(path: Path | str) -> RecordedMap:
     HDF5, is damaged or cut off, holds something else, or values that no such recording has.
     """
     path = Path(path)
-    check_regular(path)
-    if not path.is_file():
-        raise Sd2Error(f"There is no file {path}", "a gesture recording (.h5)", "Check the path")
     expected = "a complete gesture recording (.h5)"
+    check_there(path, expected)
     with open_hdf5_file(path, expected) as file, refusing_damage(path, expected):
         values = _values(file, path)  # (ranges, Dopplers, T)
         marks = _marks(file, path, values.shape[2])  # (T,)

@@ -20,7 +20,7 @@ from pydantic import AliasPath, BaseModel, Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
-from sd2core.files.limits import check_regular, check_size
+from sd2core.files.limits import check_regular, check_size, check_there
 from sd2core.files.numpy_files import open_npy_file, read_words
 from sd2core.files.texts import faults_in, read_json, reading_as
 
@@ -104,9 +104,7 @@ class StoredArray(NamedTuple):
 def open_stored(path: Path, dataset: str | None) -> StoredArray:
     """Open the array in a file; Sd2Error if there is none, or it is damaged."""
     suffix = path.suffix.lower()
-    check_regular(path)
-    if not path.is_file():
-        raise Sd2Error(f"There is no file {path}", "samples of a radar", "Check the path")
+    check_there(path, "samples of a radar")
     if suffix in HDF5_SUFFIXES:
         return _hdf5(path, dataset)
     if suffix == MATLAB_SUFFIX:
@@ -239,9 +237,7 @@ def _matlab_damage(path: Path) -> AbstractContextManager[None]:
 
 def _sigmf(path: Path) -> StoredArray:
     meta, data = read_sigmf_meta(path), path.with_suffix(DATA)
-    check_regular(data)
-    if not data.is_file():
-        raise Sd2Error(f"There is no file {data}", "the samples beside their metadata")
+    check_there(data, "the samples beside their metadata")
     each = meta.channels * (2 if meta.is_complex else 1)
     count, left = divmod(data.stat().st_size, each * meta.word.itemsize)
     if left or not count:
