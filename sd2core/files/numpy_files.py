@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,32 +16,16 @@ from sd2core.files.limits import check_regular, check_size, open_regular, size_b
 from sd2core.files.texts import reading_as
 
 
-class NpzArrays(Mapping[str, NDArray[Any]]):
+class NpzArrays(np.lib.npyio.NpzFile):
     """Arrays of an open ``.npz`` by name, each read when asked for; no pickle is executed."""
 
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._entries = {
-            entry.filename.removesuffix(".npy"): entry
-            for entry in archive.infolist()
-            if entry.filename.endswith(".npy")
-        }
-        self.archive = archive
-
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._entries)
+    zip: Any  # the archive
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        entry = self._entries[name]
-        with self.archive.open(entry) as stream:
-            shape, _, dtype = read_array_header(stream)
-            stored = entry.file_size - stream.tell()
-        if math.prod(shape) * dtype.itemsize > stored:
-            raise ValueError(f"{name} declares {dtype} of shape {shape}, in {stored:,} bytes")
-        with self.archive.open(entry) as stream:
-            return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+        array = super().__getitem__(name)
+        if not isinstance(array, np.ndarray):
+            raise ValueError(f"{name} is no array")
+        return array
 
 
 @contextmanager
@@ -70,8 +53,8 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
         open, except in another file.
     """
     try:
-        with open_zip(path) as archive:
-            yield NpzArrays(archive)
+        with open_zip(path) as archive, NpzArrays(cast(IO[bytes], archive.fp)) as arrays:
+            yield arrays
     except Sd2Error:
         raise
     except Exception as error:  # a damaged archive fails in many ways

@@ -20,7 +20,7 @@ Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 def npz_bytes(path: Path) -> int:
     """Bytes of an ``.npz``'s arrays in memory; Sd2Error if it is no ``.npz``."""
     with open_npz_file(path, ".npz", _EXPECTED) as arrays:
-        return sum(member.file_size for member in arrays.archive.infolist())
+        return sum(member.file_size for member in arrays.zip.infolist())
 
 
 def npz_vertices(path: Path) -> tuple[int, int]:
@@ -74,9 +74,9 @@ def _vertices(arrays: NpzArrays, path: Path) -> IO[bytes]:
     """File of the vertices, with its header."""
     for name in VERTEX_NAMES:
         if name in arrays:
-            return arrays.archive.open(f"{name}.npy")
+            return arrays.zip.open(f"{name}.npy")
     raise Sd2Error(
-        f"{path} holds {', '.join(sorted(arrays.archive.namelist())) or 'nothing'}",
+        f"{path} holds {', '.join(sorted(arrays.zip.namelist())) or 'nothing'}",
         "an array 'vertices' (or 'verts') of shape (frames, vertices, 3)",
     )
 

@@ -63,7 +63,7 @@ def test_an_array_larger_than_its_bytes_is_refused(tmp_path: Path, shape: str) -
     path = tmp_path / "claim.npz"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("a.npy", claiming(shape))
-    with pytest.raises(Sd2Error, match=rf"claim\.npz.*a declares float64 of shape \({shape},\)"):
+    with pytest.raises(Sd2Error, match=r"claim\.npz cannot be read as numbers"):
         read(path)
     (tmp_path / "claim.npy").write_bytes(claiming(shape))
     with pytest.raises(Sd2Error, match=r"claim\.npy \(.* bytes\) cannot be read"):
