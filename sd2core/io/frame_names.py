@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +23,12 @@ _FRAME_WORDS = {"f", "frame", "frm", "img", "image", "t"}
 _SHOWN = 3
 
 
-@dataclass
-class FrameFiles:
+class FrameFiles(NamedTuple):
     """Files of one person, one per frame, in order."""
 
     files: list[Path]
-    numbers: NDArray[np.int64] | None = None  # of the frames, where the names count them
-    notes: list[str] = field(default_factory=list)
+    numbers: NDArray[np.int64] | None  # of the frames, where the names count them
+    notes: list[str]
 
 
 def natural_key(name: str) -> tuple[object, ...]:
@@ -77,31 +75,26 @@ def numbered_frames(files: Sequence[Path], person: int | str | None, source: str
     Sd2Error
         If there is no such person, or the names are of two kinds.
     """
-    numbers = _numbers_in(files, source)
-    if numbers is None or len(numbers) < 2:
-        listing = FrameFiles(list(files))
-        if numbers is None:
-            listing.notes.append(
-                "The names do not tell frame and person: the files are taken as consecutive frames"
-                " of one person."
-            )
-        elif numbers:
-            _count(listing, numbers[0], numbers[0])
-        if person is not None:
-            raise Sd2Error(
-                f"Person {person} is asked for, and the names in {source} tell no persons",
-                "names such as 000012_0.obj, of frame 12 and person 0",
-            )
-        return listing
-    frames, persons = numbers
-    counts = _counted(persons)
-    notes: list[str] = []
-    own = persons == chosen_person(counts, person, source, notes)
-    listing = FrameFiles([file for file, its in zip(files, own, strict=True) if its], notes=notes)
-    order = np.argsort(frames[own], kind="stable")
-    listing.files = [listing.files[place] for place in order]
-    _count(listing, frames[own][order], frames)
-    return listing
+    numbers, notes = _numbers_in(files, source), list[str]()
+    if numbers is None:
+        notes.append(
+            "The names do not tell frame and person: the files are taken as consecutive frames of"
+            " one person."
+        )
+    if numbers and len(numbers) == 2:
+        frames, persons = numbers
+        chosen = chosen_person(_counted(persons), person, source, notes)
+        own = np.flatnonzero(persons == chosen)
+        order = own[np.argsort(frames[own], kind="stable")]
+        counted = _frame_numbers(frames[order], frames, notes)
+        return FrameFiles([files[place] for place in order], counted, notes)
+    if person is not None:
+        raise Sd2Error(
+            f"Person {person} is asked for, and the names in {source} tell no persons",
+            "names such as 000012_0.obj, of frame 12 and person 0",
+        )
+    counted = _frame_numbers(numbers[0], numbers[0], notes) if numbers else None
+    return FrameFiles(list(files), counted, notes)
 
 
 def persons_among(files: Sequence[Path], source: str) -> dict[int, int]:
@@ -165,30 +158,32 @@ def chosen_person(
     return key
 
 
-def _count(listing: FrameFiles, frames: NDArray[np.int64], all_frames: NDArray[np.int64]) -> None:
-    """Number the frames of a person, where their numbers count frames; ``all_frames`` of all."""
+def _frame_numbers(
+    frames: NDArray[np.int64], all_frames: NDArray[np.int64], notes: list[str]
+) -> NDArray[np.int64] | None:
+    """Numbers of a person's frames, where those of all count frames; None where they do not."""
     every = np.unique(all_frames)
     steps = np.diff(every)
     if len(np.unique(frames)) < len(frames) or not steps.size:
-        return
+        return None
     step = int(np.gcd.reduce(steps))
     if int(np.median(steps)) != step:
-        listing.notes.append(
+        notes.append(
             f"The numbers in the names go up by {np.median(steps):g} typically and do not count"
             " frames: the files are taken as consecutive ones."
         )
-        return
+        return None
     # Counted from 0 or from 1, the first picture is where the video begins.
     first = int(every[0])
     start = first // step if first > 1 else 0
-    listing.numbers = (frames - first) // step + start
     if step > 1:
-        listing.notes.append(
+        notes.append(
             f"The names count in steps of {step}: the files are taken as consecutive frames, whose"
             " rate is to be given (--fps)."
         )
     if start:
-        listing.notes.append(f"The first frame is number {first:,}: time before it is empty.")
+        notes.append(f"The first frame is number {first:,}: time before it is empty.")
+    return (frames - first) // step + start
 
 
 def _person_is_first(
