@@ -226,6 +226,7 @@ def _fit_people(options: Fit) -> None:
             about = _summary(options, mesh, made, seconds, chosen)
             summaries.append({"person": person.number, "certainty": person.certainty, **about})
             if not (options.progress_json or options.json):
+                stack.close()  # the bar, on whose line it would be
                 _print(about, made)
     if options.progress_json:
         _tell_end(options, meshes, time.perf_counter() - begun_s)
@@ -300,12 +301,10 @@ def _bars(stack: ExitStack, of_whom: str = "") -> FitReport:
     """One bar after the other on standard error."""
     from sd2core.body.fit_video import FitReport
 
-    current = stack.enter_context(ExitStack())
-
     def progress_of(stage: Stage) -> Progress:
-        current.close()
+        stack.close()
         words, unit = _BARS[stage]
-        return current.enter_context(progress_bar(words + of_whom, unit))
+        return stack.enter_context(progress_bar(words + of_whom, unit))
 
     def started(video: Any, resumed: bool) -> None:
         if resumed and sys.stderr.isatty():

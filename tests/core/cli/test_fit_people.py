@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +19,7 @@ from sd2core.body.fit_video import FitChoices, FitReport
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.io.fitted import fitted_camera
 from sd2core.io.mesh import load_mesh
-from sd2core.progress import silent
+from sd2core.progress import Progress, silent
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +52,33 @@ def test_what_cannot_be_is_refused(words: list[str], message: str, sd2: Sd2) -> 
     outcome = sd2("fit", "two.mp4", *words)
     assert outcome.code != 0
     assert message in outcome.err
+
+
+def test_no_bar_stands_where_a_result_is_printed(
+    sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bars, beside = [], []
+
+    @contextmanager
+    def bar(what: str, unit: str) -> Iterator[Progress]:
+        bars.append(what)
+        yield silent
+        bars.remove(what)
+
+    def fitted(video: Path, out: Path, people: list[Any], *more: Any, **_: Any) -> Iterator[Any]:
+        more[1](1).progress_of("write")
+        yield people[0], out, more[0], None
+
+    person = SimpleNamespace(number=1, certainty=1.0)
+    monkeypatch.setattr("sd2core.body.fit_people.people_to_fit", lambda *_: [person])
+    monkeypatch.setattr("sd2core.body.fit_people.is_stopped", lambda *_: False)
+    monkeypatch.setattr("sd2core.body.fit_people.fit_people", fitted)
+    monkeypatch.setattr("sd2core.cli.fit.progress_bar", bar)
+    monkeypatch.setattr("sd2core.cli.fit._summary", lambda *_: {})
+    monkeypatch.setattr("sd2core.cli.fit._print", lambda *_: beside.append([*bars]))
+    out = tmp_path / "two.zarr"
+    assert sd2("fit", "two.mp4", "--people", "all", "--out", out).code == 0
+    assert beside == [[]]
 
 
 @pytest.mark.slow
