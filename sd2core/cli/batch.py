@@ -21,6 +21,7 @@ from sd2core.cli.output import (
     progress_bar,
 )
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import bytes_text
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, OptionError, Place
 from sd2core.options.shared import JsonAndProgress
@@ -229,11 +230,11 @@ def print_estimate(made: BatchEstimate, plan: BatchPlan) -> None:
         f"{plan.out}: {counted(made.recordings, 'recording')},"
         f" {counted(plan.placement_count, 'placement')} each"
     )
-    size = f"At most {bytes_words(made.bytes)}."
+    size = f"At most {bytes_text(made.bytes)}."
     rows = [("step", "to do", "there", "one process", "written")]
     for step, one in made.steps.items():
         time = "not known" if one.seconds is None else duration(one.seconds)
-        rows.append((step, f"{one.to_do:,}", f"{one.there:,}", time, bytes_words(one.bytes)))
+        rows.append((step, f"{one.to_do:,}", f"{one.there:,}", time, bytes_text(one.bytes)))
     print_rows(rows, right=(1, 2, 3, 4))
     workers = "1 process" if made.workers == 1 else f"{made.workers} processes"
     if made.seconds is None:
@@ -246,12 +247,3 @@ def print_estimate(made: BatchEstimate, plan: BatchPlan) -> None:
         print(f"{counted(len(made.unusable), 'recording')} of the inspected ones cannot be used:")
         for words in made.unusable[:_LISTED_UNUSABLE]:
             print(f"  {words}")
-
-
-def bytes_words(size: float) -> str:
-    """Return such as ``1.2 GB``."""
-    for unit in ("B", "kB", "MB", "GB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:,.3g} TB"

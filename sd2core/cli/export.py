@@ -21,6 +21,7 @@ from sd2core.cli.output import (
     progress_events,
     tell_lost,
 )
+from sd2core.files.tables import bytes_text
 from sd2core.options.exporting import MAPS, PEOPLE, SEGMENTS, Exporting, SpanOptions
 from sd2core.options.kinds import Names
 from sd2core.options.records import ARGUMENTS, OptionRecord, Place, given
@@ -222,7 +223,7 @@ def _dry_run(options: Export, sources: list[LazySource], wanted: Exporting, maki
     else:
         facts = {
             "segments": f"{forecast.segments:,} of {counted(forecast.sources, 'source')}",
-            "size": f"{forecast.total_bytes / 1e6:,.1f} MB before compression",
+            "size": f"{bytes_text(forecast.total_bytes)} before compression",
             "kinds": listed(forecast.of_kind),
             "labels": listed(forecast.of_label),
             "splits": listed(forecast.of_split()),

@@ -18,6 +18,7 @@ from sd2core.cli.output import (
     progress_bar,
 )
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import bytes_text
 from sd2core.options.kinds import Count, Natural
 from sd2core.options.records import OptionError, Place, given_flags
 from sd2core.options.shared import Json, MeshInput, Overwrite
@@ -220,7 +221,7 @@ def _print(
             "radar": f"{radar.name}: {limits}",
             "beyond it": ", ".join(beyond) or "none",
             "cost": f"{counted(cost.maps, 'map')} of {counted(cost.frames, 'frame')}:"
-            f" {duration(cost.total_s)}, {cost.total_bytes / 1e6:,.1f} MB before compression",
+            f" {duration(cost.total_s)}, {bytes_text(cost.total_bytes)} before compression",
             "plan": choice.summary,
         },
     )

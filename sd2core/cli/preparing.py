@@ -12,6 +12,7 @@ from sd2core.cli.output import print_rows, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import size_bytes
 from sd2core.files.paths import remove, user_cache, user_data
+from sd2core.files.tables import bytes_text
 from sd2core.options.records import OptionError, OptionRecord, Place
 from sd2core.options.shared import Json
 
@@ -169,13 +170,11 @@ def remove_caches(*, ask: bool) -> None:
 
     Raises Sd2Error where there is nobody to ask, or one of them stays.
     """
-    from sd2core.cli.batch import bytes_words
-
     paths = caches()
     if not paths:
         print("There are no caches")
         return
-    print_rows([("size", "cache"), *((bytes_words(size_bytes(one)), str(one)) for one in paths)])
+    print_rows([("size", "cache"), *((bytes_text(size_bytes(one)), str(one)) for one in paths)])
     if ask and not sys.stdin.isatty():
         raise Sd2Error("Nothing was removed: there is no terminal to ask on", remedy="Add --yes")
     if ask and input("Remove them? They are made again when needed. [y/N] ").lower() != "y":

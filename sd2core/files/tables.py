@@ -40,6 +40,15 @@ def counted(number: int, what: str, several: str = "") -> str:
     return f"{number:,} {what if number == 1 else several or what + 's'}"
 
 
+def bytes_text(count: float) -> str:
+    """Size in bytes with a suitable unit, as ``1.2 GB``."""
+    for unit, size in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            value = count / size
+            return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
+    return f"{count:.0f} bytes"
+
+
 # With wide signs, which some spreadsheets compute as well. Apostrophes count, so that a text with
 # one of its own comes back.
 _FORMULA = re.compile(r"'*\s*[=+\-@＝＋－＠]")

@@ -21,8 +21,8 @@ from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.synthesis import Choosing, synthesise
 from sd2core.batch.task_graph import TaskGraph
-from sd2core.cli.batch import bytes_words
 from sd2core.files.limits import size_bytes
+from sd2core.files.tables import bytes_text
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
@@ -174,8 +174,8 @@ def _million(costs: list[Cost], own_s: float, files_per_s: float) -> dict[str, o
     steps = [["step", "per frame", "hours of one core", "written"]]
     for step in count:
         frame = f"{1e3 * by_step[step].frame_s:.3f} ms"
-        steps.append([step, frame, f"{seconds[step] / 3600:,.0f}", bytes_words(size[step])])
-    steps.append(["all", "", f"{total_s / 3600:,.0f}", bytes_words(sum(size.values()))])
+        steps.append([step, frame, f"{seconds[step] / 3600:,.0f}", bytes_text(size[step])])
+    steps.append(["all", "", f"{total_s / 3600:,.0f}", bytes_text(sum(size.values()))])
     machines = [["cores", "time", "load of the scheduler"]]
     for number in (64, 256, 1024, 4096):
         time_s = total_s / number

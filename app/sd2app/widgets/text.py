@@ -10,6 +10,7 @@ import time
 
 from PySide6.QtGui import QKeySequence
 
+from sd2core.files.tables import bytes_text as bytes_text
 from sd2core.files.tables import counted as counted
 
 
@@ -68,15 +69,6 @@ def milliseconds(value_ms: float) -> str:
 def seconds(value_s: float) -> str:
     """Duration in seconds or milliseconds."""
     return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
-
-
-def bytes_text(count: int) -> str:
-    """Size in bytes with a suitable unit."""
-    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= size:
-            value = count / size
-            return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
-    return f"{count} bytes"
 
 
 def canonical(key: str) -> str:
