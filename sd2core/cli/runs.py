@@ -86,41 +86,35 @@ def _steer(run: TrainingFolder, word: Command) -> Report:
 
 def _print_one(run: TrainingFolder) -> None:
     status = run.status()
-    facts = {
-        "state": status.state,
-        "model": status.model,
-        "done": _done(status),
-        "time": _times(status),
-        "validation": _validation(status),
+    more = {
         "file": str(run.best) if status.has_model else "",
         "error": status.error or "",
         "go on": f"sd2 train --resume {run.path}" if status.resumable else "",
     }
-    print_facts(str(run.path), facts)
+    print_facts(str(run.path), _facts(status) | more)
 
 
 def _print_table(runs: list[TrainingFolder]) -> None:
     if not runs:
         print("There are no runs here. `sd2 train DATA --out RUN` makes one.")
         return
-    rows = [("run", "state", "model", "done", "time", "validation")]
+    rows: list[tuple[str, ...]] = [("run", "state", "model", "done", "time", "validation")]
     for run in runs:
         try:
-            status = run.status()
+            rows.append((run.path.name, *_facts(run.status()).values()))
         except Sd2Error as error:
             rows.append((run.path.name, "damaged", "", "", "", error.found))
-            continue
-        rows.append(
-            (
-                run.path.name,
-                status.state,
-                status.model,
-                _done(status),
-                _times(status),
-                _validation(status),
-            )
-        )
     print_rows(rows)
+
+
+def _facts(status: RunStatus) -> dict[str, str]:
+    return {
+        "state": status.state,
+        "model": status.model,
+        "done": _done(status),
+        "time": _times(status),
+        "validation": _validation(status),
+    }
 
 
 def _done(status: RunStatus) -> str:
