@@ -85,17 +85,3 @@ def pose_kernel(
             vertices[t, v, 0] = px
             vertices[t, v, 1] = py
             vertices[t, v, 2] = pz
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    pose_kernel(
-        np.zeros((1, 3)),
-        np.zeros((1, 8), np.int32),
-        np.zeros((1, 8)),
-        np.zeros(1, np.int32),
-        np.zeros((1, 1, 3, 4)),
-        0,
-        1,
-        np.empty((1, 1, 3), np.float32),
-    )

@@ -135,7 +135,7 @@ def _say_new_name(job: str) -> None:
 def _compile() -> None:
     from sd2core.numerics.compiled import warm_up
 
-    with progress_bar("Compiling", unit="module") as progress:
+    with progress_bar("Compiling", unit="kernel") as progress:
         warm_up(progress)
 
 

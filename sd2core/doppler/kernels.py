@@ -17,7 +17,7 @@ import numpy as np
 
 from sd2core.numerics.compiled import compiled
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
-from sd2core.scattering.beam_kernels import beam_tables, weigh_by_beam
+from sd2core.scattering.beam_kernels import weigh_by_beam
 from sd2core.scattering.visibility import facing_kernel
 
 RUN = 16384
@@ -553,21 +553,3 @@ def needed_kernel(  # type: ignore[no-untyped-def]
             _slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
             for i in range(n):
                 needed[t, numbers[i]] |= live[slot[i]]
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once in single and once in double precision."""
-    knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
-    marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
-    tables = beam_tables(None)
-    beam = (tables.axes[None], tables.across, tables.up)
-    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE, beam)
-    for precision in (np.float32, np.float64):
-        paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
-        scale, ends = np.ones((1, 1), precision), np.zeros((1, 3), precision)
-        law = (32, DROP, 4.0, np.float32(2.2))
-        count_kernel(
-            paths, 0, scale, scatterers, ends, law,
-            np.zeros((1, 1, 32)), np.zeros(1), np.zeros(1),
-        )  # fmt: skip
-        needed_kernel(paths, 0, scale, ends, law, np.ones(33, np.uint8), marks.copy())

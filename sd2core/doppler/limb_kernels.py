@@ -10,10 +10,8 @@ import math
 import numpy as np
 
 from sd2core.doppler.kernels import (
-    ALL,
     DROP,
     MASK,
-    ONE,
     RUN,
     WRAP,
     axis_positions,
@@ -25,7 +23,6 @@ from sd2core.doppler.kernels import (
     weigh_run,
 )
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.beam_kernels import beam_tables
 
 PARTS = 8
 """Number of parts of the fine axis per bin."""
@@ -253,21 +250,3 @@ def _share_below(steps):  # type: ignore[no-untyped-def]
         return 1.0
     whole = int(at)
     return _TABLE[whole] + (at - whole) * (_TABLE[whole + 1] - _TABLE[whole])
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once in single and once in double precision."""
-    knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
-    marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
-    tables = beam_tables(None)
-    beam = (tables.axes[None], tables.across, tables.up)
-    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE, beam)
-    sigma, part = np.ones((1, 1)), np.zeros(1, np.intp)
-    coarse = np.zeros((1, 1, 32))
-    for precision in (np.float32, np.float64):
-        paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
-        fine_kernel(
-            paths, np.ones((1, 1), precision), scatterers, np.zeros((1, 3), precision),
-            (32, DROP, 4.0, np.float32(2.2)), part[[0, 0, 0, 0]], 0, sigma, part,
-            np.zeros((1, 1, 256)), coarse, np.zeros(1), np.zeros(1),
-        )  # fmt: skip

@@ -98,16 +98,3 @@ def marked_counts_kernel(mask, multiplicity, visible):  # type: ignore[no-untype
     """Number of vertices that a mask (n, V) marks in each frame (n,), or that they stand for."""
     for t in range(mask.shape[0]):
         visible[t] = multiplicity_seen(mask[t], multiplicity)
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once with each type that it is used with."""
-    knots, first, vertex = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
-    normals, points = np.zeros((1, 3, 4), np.int8), np.ones((1, 3, 4), np.float32)
-    for values in (normals, points, points.astype(np.float64)):
-        gather_kernel(values, knots, vertex, first, np.empty(12, values.dtype))
-    for positions in (points, points.astype(np.float64)):
-        sensor = np.zeros(3, positions.dtype)
-        moving_kernel(positions, knots, knots, np.ones((1, 1)), np.zeros((1, 4), np.bool_))
-        facing_counts_kernel(positions, normals, points[0, 2], 0, sensor, np.zeros(1))
-    marked_counts_kernel(normals[0].view(np.uint8), points[0, 0], np.zeros(3))

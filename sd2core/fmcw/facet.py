@@ -200,9 +200,3 @@ def bent_facet_mean(
     )  # fmt: skip
     change += change_a + change_b + change_c
     return 0.25 * (at_a + at_b + at_c + inside), 0.25 * change
-
-
-def compile_kernels() -> None:
-    """Call every kernel once with the types it is used with."""
-    facet_mean(0.0, 1.0, 2.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    bent_facet_mean(0.0, 1.0, 2.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

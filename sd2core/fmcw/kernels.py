@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.fmcw.facet import bent_facet_mean, unit_phasor
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.beam_kernels import beam_tables, gain_towards
+from sd2core.scattering.beam_kernels import gain_towards
 
 Floats = NDArray[np.float64]
 
@@ -347,32 +347,3 @@ def recurrent_sum(
                 imaginary_total[n, m] += y
                 real[m] = x * cosine[m] - y * sine[m]
                 imaginary[m] = x * sine[m] + y * cosine[m]
-
-
-def compile_kernels() -> None:
-    """Call every kernel once with the types it is used with."""
-    one = np.zeros(1)
-    echo = np.zeros((1, 1), np.complex128)
-    corners = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]])
-    facet_echoes(
-        corners,
-        np.zeros((3, 3)),
-        np.array([[0, 1, 2]], np.int32),
-        np.ones(1, np.bool_),
-        np.vstack([np.zeros(3), np.eye(3)]),
-        np.vstack([np.zeros(3), np.eye(3)]),
-        np.array([0.0, 0.0, 0.0, 1.0]),
-        1.0,
-        1.0,
-        beam_tables(None).across,
-        beam_tables(None).up,
-        True,
-        1.0,
-        np.zeros(1, np.int32),
-        one,
-        one,
-        echo,
-    )
-    direct_sum(one, one, one, one, echo, 0, 1, 0.0, 0.0, 1.0, np.zeros((1, 1), np.complex128))
-    square = np.zeros((1, 1))
-    recurrent_sum(one, one, one, one, echo, 0.0, 0.0, 1.0, square, square.copy())

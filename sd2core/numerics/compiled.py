@@ -46,7 +46,7 @@ KERNEL_MODULES = (
     "sd2core.body.skinning",
     "sd2core.numerics.raster",
 )
-"""Every module with kernels; each has ``compile_kernels()``, which calls them once."""
+"""Every module with kernels; :mod:`sd2core.accuracy.warming` calls all of them."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARKER = "complete"
@@ -164,14 +164,17 @@ def kernels_ready() -> bool:
 def warm_up(progress: Progress = silent) -> None:
     """Compile every kernel that is not on disk yet (about half a minute the first time)."""
     global _ready
-    directory = cache_directory()
-    for done, name in enumerate(KERNEL_MODULES):
-        progress(done, len(KERNEL_MODULES))
-        importlib.import_module(name).compile_kernels()
+    directory, ready = cache_directory(), _ready
+    progress(*kernels_compiled())
+    _ready = True  # for the work done here, which is not to wait for another process
+    try:
+        for _ in importlib.import_module("sd2core.accuracy.warming").call_kernels():
+            progress(*kernels_compiled())
+    except BaseException:
+        _ready = ready
+        raise
     if directory is not None:
         (directory / _MARKER).touch()
-    _ready = True
-    progress(len(KERNEL_MODULES), len(KERNEL_MODULES))
 
 
 def kernels_compiled() -> tuple[int, int]:

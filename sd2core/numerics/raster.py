@@ -98,13 +98,3 @@ def interpolate(
             values[n, a] = inverse * (
                 w0 * attributes[i, a] + w1 * attributes[j, a] + w2 * attributes[k, a]
             )
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    points, nearness = np.zeros((3, 2), np.float32), np.ones(3, np.float32)
-    faces = np.array([[0, 1, 2]], np.int32)
-    buffer, owner = np.zeros((2, 2), np.float32), np.zeros((2, 2), np.int32)
-    pixel, value = np.zeros(1, np.intp), np.zeros((1, 3), np.float32)
-    rasterise(points, nearness, faces, buffer, owner)
-    interpolate(points, nearness, faces, pixel, pixel, owner, np.zeros((3, 3), np.float32), value)

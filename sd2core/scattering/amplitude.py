@@ -94,11 +94,3 @@ def range_weight(
     """
     ratio = reference_range_m / np.maximum(range_m, NEAREST_RANGE_M)
     return np.power(ratio, exponent).astype(np.float32)
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    positions = np.zeros((1, 3, 3), np.float32)
-    faces = np.array([[0, 1, 2]], np.int32)
-    vertex_areas_kernel(positions, faces, np.empty((1, 3), np.float32))
-    vertex_area_vectors_kernel(positions, faces, np.empty((1, 3, 3), np.float32))

@@ -123,12 +123,3 @@ def weigh_by_beam(x, y, z, sx, sy, sz, axes, across, up, weight):  # type: ignor
         for i in range(count):
             gain = _looked_up(across, level_at[i]) * _looked_up(up, high_at[i])
             weight[first + i] *= gain
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once in single and once in double precision."""
-    tables = beam_tables(VirtualSensor(beam=Beam(60.0, 60.0)))
-    for precision in (np.float32, np.float64):
-        line, weight = np.zeros(1, precision), np.ones(1, np.float32)
-        weigh_by_beam(line, line, line, line[0], line[0], line[0], *tables, weight)
-    gain_towards(0.0, 0.0, 1.0, tables.across, tables.up)

@@ -175,16 +175,3 @@ def hide_behind(
         np.empty((0, hiding.points.shape[2]), np.uint8) if counts is None else counts,
         points, origins_m, places_m, needed, visible,
     )  # fmt: skip
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    points = np.array([[[0, 1, 0], [0, 0, 1], [2, 2, 2]]], np.float32)
-    faces, none, marks = (
-        np.array([[0, 1, 2]], np.int32),
-        np.zeros((1, 3)),
-        np.ones((1, 3), np.uint8),
-    )
-    _hide_behind_kernel(
-        points, none, faces, np.zeros((1, 1, 2, 3)), marks, points, none, none, marks, marks.copy()
-    )

@@ -253,11 +253,3 @@ def depth_visibility_kernel(
             np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth,
             visible[t],
         )  # fmt: skip
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    positions = np.array([[[0, 1, 0], [0, 0, 1], [2, 2, 2]]], np.float32)
-    faces = np.array([[0, 1, 2]], np.int32)
-    marks = np.ones((1, 3), np.uint8)
-    depth_visibility_kernel(positions, faces, False, np.zeros(3), 128, marks, 0, 1, marks.copy())

@@ -442,11 +442,3 @@ def axes_along(fx: float, fy: float, fz: float, axes: NDArray[np.float64]) -> No
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
         axes[1, a] = axes[2, b] * axes[0, c] - axes[2, c] * axes[0, b]
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    positions = np.array([[[0, 1, 0], [0, 0, 1], [2, 2, 2]]], np.float32)
-    faces = np.array([[0, 1, 2]], np.int32)
-    marks = np.ones((1, 3), np.uint8)
-    exact_visibility_kernel(positions, faces, np.zeros(3), marks, 0, 1, marks.copy())

@@ -127,14 +127,3 @@ def facing_kernel(  # type: ignore[no-untyped-def]
             + (sz - z[v]) * np.float32(nz[v])
         )
         visible[v] = np.uint8(1) if cosine >= np.float32(0) else np.uint8(0)
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    positions = np.zeros((1, 3, 3), np.float32)
-    faces = np.array([[0, 1, 2]], np.int32)
-    normals = np.empty((1, 3, 3), np.int8)
-    vertex_normals_kernel(positions, faces, normals)
-    zero = np.float32(0)
-    x, nx = positions[0, 0], normals[0, 0]
-    facing_kernel(x, x, x, nx, nx, nx, zero, zero, zero, np.empty(3, np.uint8))

@@ -21,13 +21,12 @@ from timing import best_s
 
 from sd2core.files.resources import resource_path
 from sd2core.fmcw import WaveOptions, simulate_radar
-from sd2core.fmcw.kernels import compile_kernels
 from sd2core.fmcw.reference import CONVERGED_L1, converged_frame, doppler_marginal
 from sd2core.fmcw.sums import direct, nufft, recurrent
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import worker_count
+from sd2core.numerics.compiled import warm_up, worker_count
 from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VirtualSensor
@@ -39,7 +38,7 @@ CAMERA = VirtualSensor()
 
 @pytest.fixture(scope="module")
 def mesh(shared_data: Path) -> MeshSequence:
-    compile_kernels()
+    warm_up()
     return longer_walk(shared_data)
 
 
@@ -105,7 +104,7 @@ def test_whole_clip(
 ) -> None:
     stored = load_mesh(resource_path("swipes.sd2") / "mesh.zarr")
     mesh = MeshSequence(stored.read(0, FRAMES), stored.faces, stored.timebase, "swipes")
-    compile_kernels()
+    warm_up()
     begun = time.perf_counter()
     visible = facet_visibility(mesh, CAMERA)
     hiding_s = time.perf_counter() - begun

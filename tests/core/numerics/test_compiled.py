@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import sd2core
+import sd2core.accuracy.warming  # before a test keeps machine code elsewhere
 from sd2core.numerics import compiled
 from sd2core.progress import Cancelled
 
@@ -20,11 +21,11 @@ PACKAGE = Path(sd2core.__file__).parent
 ONE_KERNEL = """
 import numpy as np
 from sd2core.numerics import compiled
-from sd2core.body.skinning import compile_kernels, pose_kernel
+from sd2core.doppler.kernels import distances_of
 print(compiled.cache_directory())
 print(compiled.kernels_ready())
-compile_kernels()
-print(sum(pose_kernel.stats.cache_hits.values()))
+distances_of(np.zeros((1, 3)))
+print(sum(distances_of.stats.cache_hits.values()))
 """
 
 
@@ -107,26 +108,44 @@ def test_nothing_writable_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
     assert kernel(2) == 3
 
 
-def test_every_kernel_module_compiles_its_own() -> None:
-    for name in compiled.KERNEL_MODULES:
-        assert callable(importlib.import_module(name).compile_kernels), name
+def test_every_module_with_kernels_is_known() -> None:
     with_kernels = {
         ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
         for path in PACKAGE.rglob("*.py")
         if "\n@compiled\n" in path.read_text(encoding="utf-8")
     }
     assert with_kernels == set(compiled.KERNEL_MODULES)
+    assert with_kernels <= sys.modules.keys(), "its work loads them"
 
 
 def test_warm_up_makes_ready_and_reports(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(compiled, "_ready", False)
     monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
+    monkeypatch.setattr(compiled.subprocess, "Popen", None)  # its own work waits for nobody
     reports: list[tuple[int, int]] = []
     compiled.warm_up(lambda *report: reports.append(report))
     assert compiled.kernels_ready()
-    count = len(compiled.KERNEL_MODULES)
-    assert reports == [(done, count) for done in range(count + 1)]
+    assert (tmp_path / "complete").exists()
+    assert len(reports) > 10
+    assert {count for _, count in reports} == {compiled.kernels_compiled()[1]}
     assert compiled.compile_in_background() is None
+
+
+def test_a_warm_up_that_is_stopped_makes_nothing_ready(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(compiled, "_ready", False)
+    monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
+    reports: list[tuple[int, int]] = []
+
+    def stop(*report: int) -> None:
+        reports.append((report[0], report[1]))
+        if len(reports) == 2:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        compiled.warm_up(stop)
+    assert not compiled.kernels_ready()
 
 
 def test_every_kernel_counts_once_its_code_is_on_disk(
