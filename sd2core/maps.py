@@ -661,28 +661,14 @@ def _between(meta: Mapping[str, Any], start: int, stop: int) -> dict[str, Any]:
 
 
 def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
-    """Concatenate maps of one axis in time; metadata are those of the first."""
-    if len(maps) == 1:
-        return maps[0]
-    present = [one.present_mask for one in maps]
-    limbs = [one.limbs for one in maps if one.limbs is not None]
-    alike = len(limbs) == len(maps) and len({one.parts for one in limbs}) == 1
+    """Concatenate maps of one axis in time, without limb maps; metadata are those of the first."""
     return replace(
         maps[0],
         values=np.concatenate([one.values for one in maps], axis=1),
         timebase=Timebase(np.concatenate([one.times_s for one in maps])),
-        present=np.concatenate(present),
+        present=np.concatenate([one.present_mask for one in maps]),
         uncertainty=None,
-        limbs=_joined_limbs(limbs) if alike else None,
-    )
-
-
-def _joined_limbs(limbs: Sequence[LimbMaps]) -> LimbMaps:
-    moves = [one.kinematics for one in limbs if one.kinematics is not None]
-    return LimbMaps(
-        limbs[0].parts,
-        np.concatenate([one.values for one in limbs], axis=2),
-        np.concatenate(moves, axis=2) if len(moves) == len(limbs) else None,
+        limbs=None,
     )
 
 
