@@ -15,7 +15,6 @@ from sd2core.body.skinning import pose_vertices
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.fmcw.options import WaveOptions
-from sd2core.fmcw.reference import converged_frame
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surroundings, Thing
@@ -51,8 +50,6 @@ def call_kernels() -> Iterator[None]:
             yield
     scene = WaveScene(meshes[0], PAPER_RADAR, sensor, wave=WaveOptions(model="direct"))
     scene.frame(0.1)
-    yield
-    converged_frame(scene, 0.1, most_cuts=0)
     yield
     body = Body.load("low")
     rest = np.tile(np.eye(3), (1, len(body.skeleton), 1, 1))

@@ -253,17 +253,17 @@ def direct_sum(
     sample_turns: Floats,
     migration_turns: Floats,
     amplitude: NDArray[np.complex128],
-    start: int,
-    stop: int,
     first_chirp: float,
     first_sample: float,
     half_chirps: float,
-    total: NDArray[np.complex128],
+    real_total: Floats,
+    imaginary_total: Floats,
 ) -> None:
-    """Add scatterers to ``total``, every phase on its own.
+    """Add scatterers to the totals: one phasor per chirp, turned from sample to sample.
 
     Turns at chirp m and sample n, both counted from the frame's middle, are
-    start + m chirp + n sample + m n migration.
+    start + m chirp + n sample + m n migration. Rounding grows with the number of samples, to some
+    1e-14 times it.
 
     Parameters
     ----------
@@ -271,55 +271,10 @@ def direct_sum(
         See :class:`~sd2core.fmcw.sums.Turns`.
     amplitude : complex128 array, shape (terms, k)
         Polynomial in m over ``half_chirps``, the constant first.
-    start, stop : int
-        Half-open range of the scatterers to add.
     first_chirp, first_sample : float
         The first m and the first n.
     half_chirps : float
         Half the chirps of the radar's frame.
-    total : complex128 array, shape (chirps, samples)
-        Added to.
-    """
-    terms = amplitude.shape[0]
-    for k in range(start, stop):
-        for m in range(total.shape[0]):
-            place = first_chirp + m
-            strength = amplitude[terms - 1, k]
-            for term in range(terms - 2, -1, -1):
-                strength = strength * (place / half_chirps) + amplitude[term, k]
-            real, imaginary = strength.real, strength.imag
-            base = start_turns[k] + place * chirp_turns[k]
-            base -= math.floor(base)
-            step = sample_turns[k] + place * migration_turns[k]
-            for n in range(total.shape[1]):
-                angle = 2.0 * math.pi * (base + (first_sample + n) * step)
-                c, s = math.cos(angle), math.sin(angle)
-                total[m, n] += complex(real * c - imaginary * s, real * s + imaginary * c)
-
-
-@compiled
-def recurrent_sum(
-    start_turns: Floats,
-    chirp_turns: Floats,
-    sample_turns: Floats,
-    migration_turns: Floats,
-    amplitude: NDArray[np.complex128],
-    first_chirp: float,
-    first_sample: float,
-    half_chirps: float,
-    real_total: Floats,
-    imaginary_total: Floats,
-) -> None:
-    """Add all scatterers as :func:`direct_sum`, one phasor per chirp turned from sample to sample.
-
-    Rounding grows with the number of samples, to some 1e-14 times it.
-
-    Parameters
-    ----------
-    start_turns, chirp_turns, sample_turns, migration_turns, amplitude
-        As for :func:`direct_sum`.
-    first_chirp, first_sample, half_chirps : float
-        As for :func:`direct_sum`.
     real_total, imaginary_total : float64 array, shape (samples, chirps)
         Added to.
     """

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sd2core.fmcw.chain import taper
 from sd2core.fmcw.cutting import subdivided
-from sd2core.fmcw.sums import recurrent
+from sd2core.fmcw.sums import direct
 from sd2core.fmcw.wave import BeatSignal, GoOn, WaveScene
 
 CONVERGED_L1 = 2e-3
@@ -101,7 +101,7 @@ def _cut_body(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) ->
             for wall, visible in seen.items():
                 if not cuts:
                     echoes = scene.echoes(position, velocity, visible, receiver, wall=wall)
-                    total[receiver] += scene.sampled(recurrent(echoes, scene.config, chirps))
+                    total[receiver] += scene.sampled(direct(echoes, scene.config, chirps))
                     continue
                 shown = scene.faces if visible is None else scene.faces[visible]
                 step = max(1, _FACETS_PER_STEP // 4**cuts)
@@ -113,6 +113,6 @@ def _cut_body(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) ->
                     motion = subdivided(velocity[some], cuts).reshape(-1, 3)
                     loose = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
                     echoes = scene.echoes(corners, motion, None, receiver, loose, wall)
-                    total[receiver] += scene.sampled(recurrent(echoes, scene.config, chirps))
+                    total[receiver] += scene.sampled(direct(echoes, scene.config, chirps))
         rows.append(total)
     return np.concatenate(rows, axis=1)
