@@ -171,7 +171,7 @@ def _count(
         steps["fit"].count(task, mesh is not None, weight)
         if mesh is None:
             vertices, nowhere = _FITTED_VERTICES[fit.resolution], (0.0, 0.0, 0.0)
-            mesh = MeshInput("", "", video.frames, vertices, video.frames_per_s, nowhere)
+            mesh = MeshInput("", "", video.frames, vertices, nowhere)
     if graph.plan.synthesise is None:
         return
     for planned in graph.maps_of(origin, inspection, mesh):

@@ -51,7 +51,6 @@ class MeshInput:
     identity: str  # hash of its content and of how it is read
     frames: int
     vertices: int
-    frames_per_s: float
     target_m: Vector  # see sd2core.placements.body_extent.BodyExtent
     faces: str | None = None
     reading: Mapping[str, Any] | None = None  # arguments for load_mesh
@@ -66,7 +65,6 @@ class VideoInput:
     path: str
     identity: str  # hash of its content
     frames: int
-    frames_per_s: float
     focal_px: float | None = None  # as far as the recording knows it
 
 
@@ -227,7 +225,7 @@ class _Look:
         if is_npz and _bytes_in_memory(path) > LARGEST_IN_MEMORY_BYTES:
             if self._folder is None:
                 # The place of the body needs the whole file; it is not asked for before streaming.
-                return MeshInput(str(path), "", *npz_vertices(path), 30.0, (0.0, 0.0, 0.0))
+                return MeshInput(str(path), "", *npz_vertices(path), (0.0, 0.0, 0.0))
             path = self._unpacked(path)
         return mesh_input_of(path, key, None if faces is None else str(faces), reading)
 
@@ -247,9 +245,7 @@ class _Look:
         identity = self._digest(path)
         with recording.open_video() as video:
             focal_px = recording.focal_px(video.width, video.height)
-            return VideoInput(
-                str(path), identity, len(video), video.timebase.frames_per_s, focal_px
-            )
+            return VideoInput(str(path), identity, len(video), focal_px)
 
     def _about(self, recording: Recording, labels: Labels) -> str:
         if self._folder is None:
@@ -337,9 +333,8 @@ def mesh_input_of(
     # Who comes in too late is nowhere.
     bodies = (body if body.presence.present.any() else mesh for body in mesh.others)
     others_m = tuple(BodyExtent.of(body).target_m for body in bodies)
-    rate = mesh.timebase.frames_per_s
     shape, lost = (mesh.frame_count, mesh.vertex_count), damaged_frames(mesh.vertices)
-    return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading, others_m, lost)
+    return MeshInput(str(path), identity, *shape, (x, y, z), faces, reading, others_m, lost)
 
 
 def _record_path(folder: BatchFolder, origin: Origin) -> Path:

@@ -12,7 +12,7 @@ from sd2core.files.paths import is_absolute, located_path, stored_path
 from sd2core.files.texts import read_text
 from sd2core.files.toml import section_lines, toml_lines
 from sd2core.options.toml_files import parsed
-from sd2core.radar_profiles import RADAR_PLUG_INS, RADARS
+from sd2core.radar_profiles import RADAR_PLUG_INS
 
 
 def read_plan(path: Path) -> BatchPlan:
@@ -69,8 +69,7 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
     if plan.denoise is not None and plan.denoise.model and _is_path(plan.denoise.model):
         updates["denoise"] = replace(plan.denoise, model=changed(plan.denoise.model))
     radar = None if plan.simulate is None else plan.simulate.radar
-    is_file = radar is not None and radar not in RADARS and RADAR_PLUG_INS.find(radar) is None
-    if plan.simulate is not None and is_file:
+    if plan.simulate is not None and radar not in RADAR_PLUG_INS:
         updates["simulate"] = replace(plan.simulate, radar=changed(plan.simulate.radar))
     return plan.model_copy(update=updates)
 

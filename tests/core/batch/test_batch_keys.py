@@ -75,7 +75,7 @@ def test_keys_are_those_of_another_process() -> None:
 
 @pytest.mark.parametrize("more", ["limbs = true", 'left_out = ["walls"]', "vertices_kept = 0.5"])
 def test_maps_that_are_asked_for_otherwise_have_other_keys(more: str, tmp_path: Path) -> None:
-    mesh = MeshInput("anna.npz", "its content", 10, 6, 30.0, (0.0, 0.0, 2.0))
+    mesh = MeshInput("anna.npz", "its content", 10, 6, (0.0, 0.0, 2.0))
 
     def key(words: str) -> str:
         text = f'out = "made"\n[recordings]\nfiles = ["*.npz"]\n[synthesise]\n{words}\n'
