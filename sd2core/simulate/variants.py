@@ -12,14 +12,14 @@ from typing import Any, Literal
 import numpy as np
 
 from sd2core.accuracy.cache import scene_fingerprint
-from sd2core.body.parts import synthetic_map
+from sd2core.body.parts import known_parts, synthetic_map
 from sd2core.body.reshaping import coarser, reshaped
 from sd2core.body.shape import ShapeSpace
 from sd2core.denoise.resample_to_model import evenly
 from sd2core.doppler import SynthesisOptions, Synthesizer
 from sd2core.io.radar.mars import FRAMES_PER_S, MarsStretch, mars_parts, read_mars
 from sd2core.labels.per_frame import BACKGROUND
-from sd2core.maps import DopplerMap
+from sd2core.maps import OF, DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.mars_pairs import driven_clips, takes_of
@@ -122,7 +122,8 @@ def vary_recordings(
         + f"-{zlib.crc32(frame_labels(one.effective_labels(), names, mesh.times_s).tobytes()):08x}"
         for (one, _), mesh in zip(named, meshes, strict=True)
     ]
-    writer = _writer(out, options, round(rates_hz[0], 3), names, sources)
+    parts = _parts_of(meshes[0]) if options.limbs else ()
+    writer = _writer(out, options, round(rates_hz[0], 3), names, sources, parts)
     for number, ((recording, subject), mesh) in enumerate(zip(named, meshes, strict=True)):
         progress(number, len(named))
         _append(writer, options, names, _of_recording(recording, names, subject, mesh))
@@ -166,7 +167,7 @@ def vary_mars(
     parts = [read_mars(folder, name) for folder in folders for name in mars_parts(folder)]
     names = (BACKGROUND,)
     sources = {"sources": [Path(one.source).name for one in parts]}
-    writer = _writer(out, options, FRAMES_PER_S, names, sources)
+    writer = _writer(out, options, FRAMES_PER_S, names, sources, PARTS if options.limbs else ())
     people = dict.fromkeys(part.subject for part in parts)
     for number, person in enumerate(people):
         progress(number, len(people))
@@ -192,6 +193,7 @@ def _writer(
     frame_rate_hz: float,
     labels: Sequence[str],
     sources: Mapping[str, Any],
+    parts: Sequence[str],
 ) -> PairWriter:
     synthesis = options.synthesis
     return PairWriter(
@@ -206,8 +208,17 @@ def _writer(
             **asdict(options),
             **sources,
         },
-        parts=PARTS if options.limbs else (),
+        parts=parts,
     )
+
+
+def _parts_of(mesh: MeshSequence) -> tuple[str, ...]:
+    """Names of what limb maps of a mesh are split into, in a scene each person's."""
+    first = known_parts(mesh)
+    if not mesh.others:
+        return first.names
+    each = zip(mesh.persons, (first, *first.others), strict=True)
+    return tuple(f"{person}{OF}{name}" for person, parts in each for name in parts.names)
 
 
 def _append(

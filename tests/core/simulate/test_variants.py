@@ -14,6 +14,7 @@ from sd2core.body.model import Body
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
+from sd2core.mesh.bodies import Body as Placed
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.pairs.rows import UNKNOWN
@@ -89,6 +90,17 @@ def test_simulated_pairs_of_a_scene_have_the_labels_of_recorded_ones(tmp_path: P
     np.testing.assert_array_equal(made.takes[0].label, recorded.takes[0].label)
     assert (made.takes[0].label == UNKNOWN).sum() == 15
     assert made.provenance["scenes"] == recorded.provenance["scenes"]
+
+
+def test_pairs_of_a_scene_are_split_by_everybodys_limbs(tmp_path: Path) -> None:
+    one = swaying(tmp_path / "duo.sd2", frames=35)
+    one.subject, one.bodies = "Anna", (Placed(str(one.mesh), (1.0, 0.0, 0.5), person="Bert"),)
+    one.save()
+    options = VariantOptions("places", PAPER, limbs=True)
+    (take,) = vary_recordings([one.folder], tmp_path / "places.zarr", options).takes
+    assert take.limbs is not None
+    assert take.limbs.persons == ("Anna", "Bert")
+    np.testing.assert_allclose(take.limbs.values.sum(axis=0).T, take.synthetic, atol=1e-5)
 
 
 @pytest.mark.slow
