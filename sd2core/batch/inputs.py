@@ -110,6 +110,12 @@ def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
         matched.update(matches)
     paths = [Path(path) for path in sorted(matched)]
     paths = [path for path in paths if not {".sd2", ".zarr"} & {at.suffix for at in path.parents}]
+    if not paths:
+        raise Sd2Error(
+            f"{', '.join(recordings.files)}: all that matches lies inside of recordings or stores",
+            "recordings (.sd2), videos or meshes",
+            "Name the recordings themselves in `files` of [recordings] in the plan",
+        )
     root = Path(os.path.commonpath([path.parent for path in paths]))
     return [
         Origin(str(path), name, subject_of(recordings, path, name))

@@ -59,6 +59,14 @@ def test_recordings_are_of_whom_they_name(tmp_path: Path) -> None:
     assert [one.subject for one in found] == ["anna", "anna", "b", "c"]
 
 
+def test_files_inside_of_a_recording_alone_are_refused(tmp_path: Path) -> None:
+    (mesh,) = save_spheres(tmp_path / "meshes", 1, frames=4)
+    Recording.create(tmp_path / "anna.sd2", mesh=mesh, copy=True)
+    inside = Recordings(files=(str(tmp_path / "*.sd2" / "*.npz"),))
+    with pytest.raises(Sd2Error, match=r"\*\.npz: all that matches lies inside of recordings"):
+        find_origins(inside, tmp_path / "out")
+
+
 def test_contents_are_hashed_again_only_where_a_file_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
