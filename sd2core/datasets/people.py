@@ -126,9 +126,9 @@ class People:
         """
         if not maps:
             absent = person and self.number(person) is None
-            who = f" of {person}, who is not in its scene" if absent else ""
+            which = f"of {person}, who is not in its scene" if absent else "that is wanted"
             raise Sd2Error(
-                f"{self.recording.folder} has no map{who} that is wanted",
+                f"{self.recording.folder} has no map {which}",
                 "a mesh of who is labelled, or a radar file",
             )
         if not person:

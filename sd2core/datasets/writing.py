@@ -271,11 +271,7 @@ class _Writer:
                     return len(dataset), len(self._fingerprints)
                 store = self._unpacked(dataset)
         if store.rows == 0:
-            raise Sd2Error(
-                f"No source has {self._options.segment_frames} frames on end with a person",
-                "one segment at least",
-                "Choose shorter segments",
-            )
+            raise _without_segments(self._options)
         header = self._final(store.header)
         if not store.complete or header != store.header:
             split_of = {name: number for number, name in enumerate(SPLITS)}
@@ -309,6 +305,23 @@ class _Writer:
         key = SourceKey(entry["subject"], entry["recording"], entry["placement"])
         self._fingerprints[key] = entry["fingerprint"]
         self._names.learn(entry)
+
+
+def _without_segments(options: Exporting) -> Sd2Error:
+    if options.spans is not None:
+        shortest_s = options.spans.shortest_s
+        long_enough = f" of {shortest_s:g} s or more" if shortest_s else ""
+        return Sd2Error(
+            f"No source has a labelled span{long_enough} that shows a person",
+            "one segment at least",
+            "Label gestures, or export windows",
+        )
+    pure = f", of which {options.min_purity:.0%} have one label" if options.min_purity else ""
+    return Sd2Error(
+        f"No source has {options.segment_frames} frames on end with a person{pure}",
+        "one segment at least",
+        "Choose shorter segments",
+    )
 
 
 def _refuse_other(out: Path, form: FileFormat) -> None:

@@ -31,7 +31,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
 from sd2core.maps import LimbMaps
 from sd2core.mesh.vertex_parts import PARTS
-from sd2core.options.exporting import Exporting
+from sd2core.options.exporting import Exporting, SpanOptions
 from sd2core.progress import Cancelled, Progress
 
 OPTIONS = Exporting(segment_frames=24, overlap_frames=4)
@@ -50,6 +50,32 @@ def several() -> list[Source]:
         source("r1", "carla", frames=20),  # too short for a segment
         source("r1", "dora", frames=75),
     ]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (Exporting(segment_frames=500), "No source has 500 frames on end with a person. Exp"),
+        (
+            Exporting(segment_frames=24, min_purity=1.0, label_rule="majority"),
+            "24 frames on end with a person, of which 100% have one label",
+        ),
+        (
+            Exporting(segment_frames=24, spans=SpanOptions(shortest_s=9.0)),
+            "No source has a labelled span of 9 s or more that shows a person.*Label gestures",
+        ),
+        (
+            Exporting(segment_frames=24, spans=SpanOptions()),
+            "No source has a labelled span that shows a person",
+        ),
+    ],
+)
+def test_why_there_is_no_segment_is_said(tmp_path: Path, options, message: str) -> None:
+    one = source("r1", "anna")
+    if options.spans is not None and not options.spans.shortest_s:
+        one = replace(one, label=np.zeros_like(one.label), spans=())
+    with pytest.raises(Sd2Error, match=message):
+        write_dataset(tmp_path / "set.zarr", [one], options)
 
 
 @pytest.fixture(scope="module")
