@@ -1,4 +1,4 @@
-"""Makes ``fitting.md`` and its pictures: ``make fitting``, about fifteen minutes.
+"""Makes ``fitting.md`` and its pictures: ``make fitting``, about ten minutes.
 
 Every figure is measured when this runs. Clips and fits stay in ``build/fitting``; what is there is
 not made again, and its time is not known. The real videos are left out where the recordings are not

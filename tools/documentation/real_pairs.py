@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.card import DENOISER_PARTS
 from sd2core.io.radar.mars import MarsStretch, mars_parts, read_mars
+from sd2core.maps import mean_velocity_mps
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VelocityAxis
@@ -27,7 +28,6 @@ from tools.documentation.runs import sd2
 Floats = NDArray[np.float64]
 
 FOLDER = BUILD / "real-pairs"
-CENTRES_MPS = VelocityAxis().centres_mps
 RIDGE = 10.0
 HALVINGS = 8
 _POINT_ARRAYS = ("point_rows", "point_mps", "point_intensity")
@@ -50,9 +50,7 @@ def pairs_of(number: int) -> PairSet:
 
 def mean_mps(maps: Iterable[NDArray[np.float32]]) -> Floats:
     """Mean velocity of every frame, one take after the other; an empty one is at rest."""
-    values = np.concatenate(list(maps)).astype(np.float64)
-    total, moment = values.sum(axis=1), values @ CENTRES_MPS
-    return np.divide(moment, total, out=np.zeros(len(total)), where=total > 0)
+    return np.nan_to_num(mean_velocity_mps(np.concatenate(list(maps)), VelocityAxis()))
 
 
 def agreement_cells(estimate: Floats, truth: Floats) -> list[str]:
