@@ -97,6 +97,7 @@ def _listen(options: Listen) -> None:
       sd2 listen --replay walk.sd2 --out again.sd2 --classifier gestures.safetensors
     """
     from sd2core.live.listening import Listening
+    from sd2core.live.reception import Reception
     from sd2core.live.recording import GrowingRecording
 
     classifier = None
@@ -104,17 +105,16 @@ def _listen(options: Listen) -> None:
         from sd2core.classify.files import load_classifier
 
         classifier = load_classifier(options.classifier)
-    with contextlib.ExitStack() as begun:
-        source = _source(options)
-        begun.callback(source.close)
-        recording = GrowingRecording(options.out)
-        begun.callback(recording.close)
-        listening = Listening(source, recording, classifier=classifier)
-        begun.pop_all()  # it closes both
-    status = Status(listening, source, as_json=options.json, columns=options.columns)
-    status.begin(recording.folder, recording.is_continued)
-    follow(listening, status, options.seconds, listening.stop)
-    status.end(recording.folder)
+    with (
+        contextlib.closing(Reception(_source(options))) as reception,
+        contextlib.closing(GrowingRecording(options.out)) as recording,
+    ):
+        listening = Listening(reception, recording, classifier=classifier)
+        source, columns = reception.source, options.columns
+        status = Status(listening, source, as_json=options.json, columns=columns)
+        status.begin(recording.folder, recording.is_continued)
+        follow(listening, status, options.seconds, listening.stop)
+        status.end(recording.folder)
 
 
 def _source(options: Listen) -> Source:

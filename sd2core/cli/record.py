@@ -148,13 +148,14 @@ def _check(options: Record, choice: CameraChoice) -> int:
     from sd2core.live.filming import preview_of
     from sd2core.live.looking import Looked, look
     from sd2core.live.radars import open_radar
+    from sd2core.live.reception import Reception
     from sd2core.runs.control import stop_signals
 
     seconds = options.seconds or _CHECK_S
     with contextlib.ExitStack() as stack, stop_signals() as stop, pressed_keys() as key:
-        source = open_radar(options.radar, options.setup)
-        stack.callback(source.close)
-        camera = choice.open()
+        reception = Reception(open_radar(options.radar, options.setup))
+        stack.callback(reception.close)
+        source, camera = reception.source, choice.open()
         stack.callback(camera.close)
         if not options.json:
             print(f"{camera.about}\n{source.about}\n  {seconds:g} s: walk towards both, and away.")
@@ -179,7 +180,7 @@ def _check(options: Record, choice: CameraChoice) -> int:
                 print_event("findings", left_s=left_s, **_data(findings))
 
         delays_s = _delays_s(options, camera, source)
-        looked = look(source, camera, delays_s, seconds, stop, follow)
+        looked = look(reception, camera, delays_s, seconds, stop, follow)
     findings = check_place(radar, looked.seen, looked.moved)
     if options.previews:
         print_event("findings", left_s=0, **_data(findings))

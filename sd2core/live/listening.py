@@ -1,7 +1,7 @@
 """Frames of a radar into a recording and a Doppler map, while they come.
 
-The source hands frames over in a thread of its own and never waits: a second thread stores them,
-and the caller's makes the map. Where storing cannot follow and the buffer is full, frames are
+They are handed over in a thread of their own, which never waits: a second one stores them, and the
+caller's makes the map. Where storing cannot follow and the buffer is full, frames are
 dropped and counted; where the caller cannot, their columns are left out of the live map only.
 """
 
@@ -23,7 +23,7 @@ from sd2core.fmcw.live import LiveMap
 from sd2core.live.counts import Counts
 from sd2core.live.reception import Reception
 from sd2core.live.recording import GrowingRecording, wall_clock_s
-from sd2core.live.sources import Frame, Source
+from sd2core.live.sources import Frame
 from sd2core.radar_config import CLUTTER, RadarConfig
 from sd2core.sensor import VelocityAxis
 
@@ -62,27 +62,25 @@ class Column(NamedTuple):
 
 
 class Listening:
-    """A source being recorded, with its live map.
+    """A radar being recorded, with its live map.
 
-    The recording is closed at the end, and a source as well; a reception goes on. The classifier is
-    asked about every column of the map, which then has its axis; its card must be of the radar's
-    frame rate. Raises Sd2Error when the source does not fit the recording or the classifier.
+    The recording is closed at the end; the reception goes on. The classifier is asked about every
+    column of the map, which then has its axis; its card must be of the radar's frame rate. Raises
+    Sd2Error when the radar does not fit the recording or the classifier.
     """
 
     def __init__(
         self,
-        source: Source | Reception,
+        reception: Reception,
         recording: GrowingRecording,
         *,
         classifier: TrainedClassifier | None = None,
     ) -> None:
-        self._run = source.run
-        self._goes_on = isinstance(source, Reception)
-        source = source.source if isinstance(source, Reception) else source
+        source = reception.source
         head = source.head(0.0)
         recording.check(head)
         self.counts = Counts()
-        self._source, self._recording = source, recording
+        self._reception, self._source, self._recording = reception, source, recording
         self._labeller = None if classifier is None else _Labeller(classifier, head.radar)
         axis = VelocityAxis() if classifier is None else classifier.card.axis
         self._head = head
@@ -93,14 +91,11 @@ class Listening:
         self._to_store: queue.Queue[tuple[Frame, int]] = queue.Queue(size)
         self._to_show: queue.Queue[tuple[float, NDArray[Any], Frame]] = queue.Queue(_SHOWN_FRAMES)
         self._dropped = 0  # since the last frame that was taken
-        self._stop = threading.Event()
-        self._error: BaseException | None = None
+        self._ends = threading.Event()
+        self._error: BaseException | None = None  # of storing
         self._latencies_s: deque[float] = deque(maxlen=_KEPT_LATENCIES)
         self._last_received_s = time.monotonic()
-        self._threads = [
-            threading.Thread(target=self._receive, name="sd2-receive", daemon=True),
-            threading.Thread(target=self._store, name="sd2-store", daemon=True),
-        ]
+        self._storing = threading.Thread(target=self._store, name="sd2-store", daemon=True)
 
     @property
     def axis(self) -> VelocityAxis:
@@ -110,7 +105,7 @@ class Listening:
     @property
     def is_over(self) -> bool:
         """True once there are no more columns to come."""
-        return not any(one.is_alive() for one in self._threads) and self._to_show.empty()
+        return not self._storing.is_alive() and self._to_show.empty()
 
     @property
     def silent_s(self) -> float:
@@ -135,8 +130,8 @@ class Listening:
     def start(self) -> None:
         """Begin to listen."""
         self._last_received_s = time.monotonic()
-        for thread in self._threads:
-            thread.start()
+        self._reception.begin(self._take)
+        self._storing.start()
 
     def next_column(self, timeout_s: float) -> Column | None:
         """Column of the next frame; None where none comes within the time.
@@ -146,8 +141,7 @@ class Listening:
         try:
             time_s, words, frame = self._to_show.get(timeout=timeout_s)
         except queue.Empty:
-            if self._error is not None:
-                raise self._error from None
+            self._check()
             return None
         alone = self._head.as_capture(words)
         values = self._map.column(alone.channel(*self._channel).samples[0:1])
@@ -156,25 +150,20 @@ class Listening:
         return Column(time_s, wall_clock_s(frame.received_s), values, label)
 
     def stop(self) -> None:
-        """Stop, store what was received, and close recording and source.
+        """Stop, store what was received, and close the recording.
 
-        Raises what kept a frame from being stored.
+        Raises what kept a frame from being received or stored.
         """
-        self._stop.set()
-        for thread in self._threads:
-            if thread.is_alive():
-                thread.join()
-        if not self._goes_on:
-            self._source.close()
+        self._reception.end()
+        self._ends.set()
+        if self._storing.is_alive():
+            self._storing.join()
         self._recording.close(self._dropped)
-        if self._error is not None:
-            raise self._error
+        self._check()
 
-    def _receive(self) -> None:
-        try:
-            self._run(self._take, self._stop)
-        except BaseException as error:  # raised again where it is seen
-            self._error = self._error or error
+    def _check(self) -> None:
+        if (error := self._error or self._reception.error) is not None:
+            raise error
 
     def _take(self, frame: Frame) -> None:
         """Put a frame into the buffer, or count it as dropped."""
@@ -188,19 +177,16 @@ class Listening:
             self.counts.dropped += 1
 
     def _store(self) -> None:
-        receiving = self._threads[0]
         try:
             while True:
+                no_more = self._ends.is_set() or self._reception.is_over
                 try:
-                    frame, dropped = self._to_store.get(timeout=0.05)
+                    self._store_one(*self._to_store.get(timeout=0.05))
                 except queue.Empty:
-                    if not receiving.is_alive() and self._to_store.empty():
+                    if no_more:
                         return
-                    continue
-                self._store_one(frame, dropped)
         except BaseException as error:  # raised again where it is seen
-            self._error = self._error or error
-            self._stop.set()
+            self._error = error
 
     def _store_one(self, frame: Frame, dropped: int) -> None:
         words = self._source.words(frame)

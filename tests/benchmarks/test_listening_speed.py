@@ -17,6 +17,7 @@ import pytest
 
 from sd2core.live import sources
 from sd2core.live.listening import Listening
+from sd2core.live.reception import Reception
 from sd2core.live.recording import GrowingRecording
 from sd2core.live.sources import Dca1000Source
 from tests.core.io.radar.dca1000_files import TiRecording, cfg_of, words_of
@@ -55,7 +56,7 @@ def test_columns_come_within_two_frames(
     samples: int,
     waiting_bytes: int,
 ) -> None:
-    monkeypatch.setattr(sources, "_SOCKET_BYTES", waiting_bytes // 2)  # Linux doubles what is asked
+    monkeypatch.setattr(sources, "SOCKET_BYTES", waiting_bytes // 2)  # Linux doubles what is asked
     radar = TiRecording(
         receivers=receivers, loops=loops, samples=samples, frames=1, frame_s=1 / FRAMES_PER_S
     )
@@ -64,7 +65,7 @@ def test_columns_come_within_two_frames(
     # As many samples as that need a longer ramp than the tests' own.
     setup.write_text(text.replace(" 20 5 30 ", f" 20 5 {5 + samples / 4:g} "))
     source = Dca1000Source(setup, port=0)
-    listening = Listening(source, GrowingRecording(tmp_path / "walk.sd2"))
+    listening = Listening(Reception(source), GrowingRecording(tmp_path / "walk.sd2"))
     listening.start()
     sender = multiprocessing.get_context("spawn").Process(
         target=_send, args=(radar, source.port), daemon=True

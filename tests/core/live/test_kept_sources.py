@@ -13,7 +13,9 @@ from sd2core.io.video import open_video
 from sd2core.live.cameras import CameraChoice
 from sd2core.live.cameras import TestCamera as RehearsedCamera
 from sd2core.live.joint import JointRecording, Station
+from sd2core.live.listening import Listening
 from sd2core.live.reception import Reception
+from sd2core.live.recording import GrowingRecording
 from sd2core.live.rehearsal import TestSource as RehearsedSource
 from sd2core.live.sources import Frame, ReplaySource, Source
 from sd2core.recording.recording import open_recording
@@ -52,14 +54,11 @@ def _wait_for(is_so) -> None:
 def _recorded(reception: Reception, seconds: float) -> tuple[list[Frame], float, float]:
     """Frames of a take, and when it began and ended."""
     frames: list[Frame] = []
-    stop = threading.Event()
-    thread = threading.Thread(target=reception.run, args=(frames.append, stop))
     begin_s = time.monotonic()
-    thread.start()
+    reception.begin(frames.append)
     time.sleep(seconds)
     end_s = time.monotonic()
-    stop.set()
-    thread.join()
+    reception.end()
     return frames, begin_s, end_s
 
 
@@ -102,14 +101,18 @@ def test_the_clock_is_that_of_the_whole_session() -> None:
     reception.close()
 
 
-def test_what_stopped_the_radar_is_raised_in_the_take() -> None:
-    class Broken(Source):
+def test_what_stopped_the_radar_is_raised_in_the_take(tmp_path: Path) -> None:
+    class Broken(RehearsedSource):
         def run(self, take, stop: threading.Event) -> None:
             raise OSError("pulled out")
 
     reception = Reception(Broken())
-    with pytest.raises(OSError, match="pulled out"):
-        reception.run(lambda _: None, threading.Event())
+    listening = Listening(reception, GrowingRecording(tmp_path / "take.sd2"))
+    listening.start()
+    _wait_for(lambda: listening.is_over)
+    for what in (lambda: listening.next_column(0.01), listening.stop):
+        with pytest.raises(OSError, match="pulled out"):
+            what()
     reception.close()
 
 

@@ -21,6 +21,7 @@ from sd2core.io.radar import load_capture
 from sd2core.live import listening as listening_module
 from sd2core.live import sources as sources_module
 from sd2core.live.listening import Column, Listening
+from sd2core.live.reception import Reception
 from sd2core.live.recording import GrowingRecording
 from sd2core.live.sources import Dca1000Source, ReplaySource
 from sd2core.maps import DopplerMap
@@ -65,7 +66,7 @@ def _assert_is_map(columns: list[Column], doppler: DopplerMap) -> None:
 def test_a_replayed_capture_is_recorded_and_shown_as_it_is(tmp_path: Path) -> None:
     capture = fast_swipes()
     recording = GrowingRecording(tmp_path / "walk.sd2")
-    listening = Listening(ReplaySource(capture), recording)
+    listening = Listening(Reception(ReplaySource(capture)), recording)
     listening.start()
     began_s = time.monotonic()
     columns = _columns(listening)
@@ -126,8 +127,8 @@ def _received(source: Dca1000Source) -> int:
 def test_packets_become_what_the_file_would_be(tmp_path: Path, lanes: int, output: int) -> None:
     ti = replace(TI, lanes=lanes, output=output)
     with _card(tmp_path, ti) as (source, path, content):
-        recording = GrowingRecording(tmp_path / "walk.sd2")
-        listening = Listening(source, recording)
+        reception, recording = Reception(source), GrowingRecording(tmp_path / "walk.sd2")
+        listening = Listening(reception, recording)
         listening.start()
         packets = packets_of(content)
         for first in range(0, len(packets) - 4, 4):  # no packet in its place
@@ -140,6 +141,7 @@ def test_packets_become_what_the_file_would_be(tmp_path: Path, lanes: int, outpu
             assert column is not None, listening.counts
             columns.append(column)
         listening.stop()
+        reception.close()
         assert source.assembler.counts.duplicate == 1
         assert source.assembler.counts.invalid == 3 - 1  # 14 bytes may be a packet
         assert listening.counts.recorded == ti.frames
@@ -152,8 +154,8 @@ def test_packets_become_what_the_file_would_be(tmp_path: Path, lanes: int, outpu
 def test_lost_packets_leave_zeros_and_gaps(tmp_path: Path) -> None:
     ti = replace(TI, frames=20)
     with _card(tmp_path, ti) as (source, path, content):
-        recording = GrowingRecording(tmp_path / "walk.sd2")
-        listening = Listening(source, recording)
+        reception, recording = Reception(source), GrowingRecording(tmp_path / "walk.sd2")
+        listening = Listening(reception, recording)
         listening.start()
         size = len(content) // ti.frames
         packets = packets_of(content)
@@ -169,6 +171,7 @@ def test_lost_packets_leave_zeros_and_gaps(tmp_path: Path) -> None:
             assert column is not None, listening.counts
             columns.append(column)
         listening.stop()
+        reception.close()
         assert source.assembler.counts.lost == len(gone)
         assert any(f"Packets lost: {len(gone)}." in one for one in source.doubts(at_end=True))
     capture = open_recording(recording.folder).load_capture()
@@ -201,7 +204,7 @@ def test_a_slow_disk_drops_frames_and_says_so(
 
     monkeypatch.setattr(recording, "append", slowly)
     capture = fast_swipes(60, faster=15.0)
-    listening = Listening(ReplaySource(capture), recording)
+    listening = Listening(Reception(ReplaySource(capture)), recording)
     listening.start()
     columns = _columns(listening)
     counts = listening.counts
@@ -222,7 +225,7 @@ def test_a_slow_window_loses_nothing_of_the_recording(
     monkeypatch.setattr(listening_module, "_SHOWN_FRAMES", 32)
     capture = fast_swipes(80, faster=40.0)
     recording = GrowingRecording(tmp_path / "walk.sd2")
-    listening = Listening(ReplaySource(capture), recording)
+    listening = Listening(Reception(ReplaySource(capture)), recording)
     listening.start()
     time.sleep(80 / 1200 + 0.3)  # nobody asks for a column meanwhile
     columns = _columns(listening)
@@ -244,7 +247,7 @@ def test_what_cannot_be_stored_stops_listening(
         append(*arguments, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr(recording, "append", fails)
-    listening = Listening(ReplaySource(fast_swipes(30, 10.0)), recording)
+    listening = Listening(Reception(ReplaySource(fast_swipes(30, 10.0))), recording)
     listening.start()
     with pytest.raises(OSError, match="free some"):
         _columns(listening)
@@ -258,7 +261,9 @@ def test_what_cannot_be_stored_stops_listening(
 def test_labels_are_those_of_the_map(tmp_path: Path, delay_frames: int) -> None:
     trained = classifier(delay_frames=delay_frames)
     recording = GrowingRecording(tmp_path / "walk.sd2")
-    listening = Listening(ReplaySource(fast_swipes(60, 10.0)), recording, classifier=trained)
+    listening = Listening(
+        Reception(ReplaySource(fast_swipes(60, 10.0))), recording, classifier=trained
+    )
     listening.start()
     columns = _columns(listening)
     answers = trained.probabilities_of(np.stack([one.values for one in columns]))
@@ -278,7 +283,9 @@ def test_a_gap_is_a_new_clip_to_the_classifier(tmp_path: Path) -> None:
     times_s = capture.timebase.times_s + 0.06 * (np.arange(40) >= 20)
     capture = replace(capture, timebase=type(capture.timebase)(times_s))
     listening = Listening(
-        ReplaySource(capture), GrowingRecording(tmp_path / "walk.sd2"), classifier=trained
+        Reception(ReplaySource(capture)),
+        GrowingRecording(tmp_path / "walk.sd2"),
+        classifier=trained,
     )
     listening.start()
     columns = _columns(listening)
@@ -291,18 +298,20 @@ def test_a_classifier_of_another_rate_is_refused(tmp_path: Path) -> None:
     capture = load_capture(write_ti(tmp_path, TI))  # 50 frames/s
     with pytest.raises(Sd2Error, match=r"gives 50 frames/s\. Expected: 30 frames/s"):
         Listening(
-            ReplaySource(capture), GrowingRecording(tmp_path / "a.sd2"), classifier=classifier()
+            Reception(ReplaySource(capture)),
+            GrowingRecording(tmp_path / "a.sd2"),
+            classifier=classifier(),
         )
 
 
 def test_another_radar_is_not_appended(tmp_path: Path) -> None:
     recording = GrowingRecording(tmp_path / "walk.sd2")
-    listening = Listening(ReplaySource(fast_swipes(3, 10.0)), recording)
+    listening = Listening(Reception(ReplaySource(fast_swipes(3, 10.0))), recording)
     listening.start()
     _columns(listening)
     recording = GrowingRecording(tmp_path / "walk.sd2")
     with pytest.raises(Sd2Error, match="another radar or configuration"):
-        Listening(ReplaySource(load_capture(write_ti(tmp_path / "ti", TI))), recording)
+        Listening(Reception(ReplaySource(load_capture(write_ti(tmp_path / "ti", TI)))), recording)
     recording.close()
 
 
@@ -310,8 +319,8 @@ def test_another_radar_is_not_appended(tmp_path: Path) -> None:
 def test_a_card_that_begins_again_goes_on_in_time(tmp_path: Path) -> None:
     card = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with card, _card(tmp_path) as (source, _, content):
-        recording = GrowingRecording(tmp_path / "walk.sd2")
-        listening = Listening(source, recording)
+        reception, recording = Reception(source), GrowingRecording(tmp_path / "walk.sd2")
+        listening = Listening(reception, recording)
         listening.start()
         for pause_s in (0.5, 0.0):
             send(packets_of(content), source.port, lambda: _received(source), card)
@@ -320,6 +329,7 @@ def test_a_card_that_begins_again_goes_on_in_time(tmp_path: Path) -> None:
         while listening.counts.recorded < 2 * TI.frames and time.monotonic() < until_s:
             listening.next_column(0.1)
         listening.stop()
+        reception.close()
         assert source.assembler.counts.restarts == 1
     times_s = open_recording(recording.folder).load_capture().timebase.times_s
     assert len(times_s) == 2 * TI.frames
@@ -340,7 +350,8 @@ def test_another_sender_is_left_out(tmp_path: Path, address: str) -> None:
             other.bind((address, 0))
         except OSError:
             pytest.skip("This system has one loopback address only")
-        listening = Listening(source, GrowingRecording(tmp_path / "walk.sd2"))
+        reception = Reception(source)
+        listening = Listening(reception, GrowingRecording(tmp_path / "walk.sd2"))
         listening.start()
         send(packets[:40], source.port, lambda: _received(source), card)
         other.sendto(packets[100], ("127.0.0.1", source.port))
@@ -349,6 +360,7 @@ def test_another_sender_is_left_out(tmp_path: Path, address: str) -> None:
         while listening.counts.recorded < TI.frames and time.monotonic() < until_s:
             listening.next_column(0.1)
         listening.stop()
+        reception.close()
         assert listening.counts.whole
         assert listening.counts.recorded == TI.frames
         assert "Packets left out of another sender: 1." in source.doubts(at_end=True)
@@ -359,7 +371,7 @@ def test_a_recording_that_is_deleted_is_put_back_and_told(
 ) -> None:
     monkeypatch.setattr("sd2core.live.recording._LOOK_S", 0.0)
     recording = GrowingRecording(tmp_path / "walk.sd2")
-    listening = Listening(ReplaySource(fast_swipes()), recording)
+    listening = Listening(Reception(ReplaySource(fast_swipes())), recording)
     listening.start()
     while listening.counts.recorded < 20:
         listening.next_column(0.1)
@@ -378,7 +390,8 @@ def test_another_configuration_than_the_radars_is_noticed(
     monkeypatch.setattr(sources_module, "_JUDGED_S", 0.2)
     card = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with card, _card(tmp_path) as (source, _, content):
-        listening = Listening(source, GrowingRecording(tmp_path / "walk.sd2"))
+        reception = Reception(source)
+        listening = Listening(reception, GrowingRecording(tmp_path / "walk.sd2"))
         listening.start()
         size = len(content) // TI.frames
         for frame in range(TI.frames):  # at a third of the rate that the configuration says
@@ -388,6 +401,7 @@ def test_another_configuration_than_the_radars_is_noticed(
             send(sent, source.port, lambda: _received(source), card)
             time.sleep(3 * TI.frame_s)
         listening.stop()
+        reception.close()
         (doubt,) = (one for one in source.doubts(at_end=True) if "MB/s" in one)
         assert "walk.cfg says" in doubt
         assert "probably runs with another configuration" in doubt
@@ -415,14 +429,14 @@ def test_a_chosen_receiver_stays_chosen_when_listening_goes_on(tmp_path: Path) -
     path = write_ti(tmp_path / "ti", TiRecording(frames=6, loops=32, receivers=3))
     recording = GrowingRecording(tmp_path / "walk.sd2")
     assert recording.channel == (None, None)
-    listening = Listening(ReplaySource(path), recording)
+    listening = Listening(Reception(ReplaySource(path)), recording)
     listening.start()
     _columns(listening)
     chosen = open_recording(recording.folder)
     chosen.radar_receiver = 2
     chosen.save(chosen.load_capture().timebase)
     again = GrowingRecording(recording.folder)
-    listening = Listening(ReplaySource(path), again)
+    listening = Listening(Reception(ReplaySource(path)), again)
     listening.start()
     columns = _columns(listening)
     only = doppler_map(load_capture(path).channel(2), axis=VelocityAxis(), clutter=CLUTTER)

@@ -17,6 +17,7 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.live import ti
 from sd2core.live.listening import Listening
+from sd2core.live.reception import Reception
 from sd2core.live.recording import GrowingRecording
 from sd2core.recording.recording import open_recording
 from tests.core.io.radar.dca1000_files import TiRecording, cfg_of, words_of
@@ -182,7 +183,8 @@ def test_board_and_card_are_set_up_started_and_stopped(
     board = [one for one in hardware.log if not one.startswith("card")]
     assert board == ["sensorStop", "flushCfg", *ti.commands_of(setup)]
 
-    listening = Listening(source, GrowingRecording(tmp_path / "take.sd2"))
+    reception = Reception(source)
+    listening = Listening(reception, GrowingRecording(tmp_path / "take.sd2"))
     hardware.log.clear()
     listening.start()
     until_s = time.monotonic() + 30.0
@@ -190,6 +192,7 @@ def test_board_and_card_are_set_up_started_and_stopped(
         listening.next_column(0.05)
     assert hardware.log == [f"card {START}", "sensorStart"]
     listening.stop()
+    reception.close()
     assert hardware.log[-2:] == [f"card {STOP}", f"card {RESET}"]
     assert listening.counts.whole
     capture = open_recording(tmp_path / "take.sd2").load_capture()
