@@ -198,30 +198,19 @@ class LiveModel(SteeredCommand):
         """Add the columns that came to the map, and show it."""
         if not self._new or not self._is_shown or not self._is_linked:
             return
-        if self._map is None:
-            self._map = self._first_map()
-            if self._map is None:
-                return
-            added = True
-            self._add_new()
+        is_first = self._map is None
+        before = self._map or self._first_map()
+        if before is None:
+            return
+        self._map, self._new = extended(before, self._new), []
+        is_longer = is_first or self._map is not before
+        if is_first or (self.on_screen and not self._document.growing):
             self._follow()
-        else:
-            added = self._add_new()
-            if not self.on_screen:
-                return
-            if not self._document.growing:
-                self._follow()
-            elif added:
-                self._document.grow(self._map)
-        if added:
+        elif self.on_screen and is_longer:
+            self._document.grow(self._map)
+        if is_first or (self.on_screen and is_longer):
             self._keep_reference()
             self._painted.start()
-
-    def _add_new(self) -> bool:
-        assert self._map is not None
-        before, self._map = self._map, extended(self._map, self._new)
-        self._new = []
-        return self._map is not before
 
     def _show_video(self) -> None:
         """Open what was filmed with its video, unless there are edits that would be lost."""
