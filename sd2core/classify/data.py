@@ -20,6 +20,7 @@ from sd2core.pairs.rows import UNKNOWN as UNKNOWN
 from sd2core.pairs.store import PairSet
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase, frames_that_begin
+from sd2core.train.evaluation import check_fits
 
 BELOW_LOUDEST_DB = (20.0, 45.0)
 """Mean power of the noise in a bin, under that of the clip's loudest cell.
@@ -148,7 +149,9 @@ def clips_of_pairs(
     if kind in ("simulated", "real") and kind != pairs.kind:
         raise Sd2Error(f"The pairs hold a {pairs.kind} radar", f"a {kind} one")
     if kind == "denoised":
-        _check_denoiser(pairs, denoiser)
+        if denoiser is None:
+            raise Sd2Error("No denoiser is given", "one, for denoised maps")
+        check_fits(denoiser.card, pairs, "Choose a denoiser that learnt from pairs like these")
     names = gesture_classes(pairs.labels) if names is None else names
     classes = in_order(names)
     clips = []
@@ -288,22 +291,6 @@ def in_order(names: Iterable[str]) -> tuple[str, ...]:
             "Give labels that one thing is meant by the same class, in the label set",
         )
     return tuple(sorted(each, key=lambda name: (name != BACKGROUND, name)))
-
-
-def _check_denoiser(pairs: PairSet, denoiser: TrainedDenoiser | None) -> None:
-    if denoiser is None:
-        raise Sd2Error("No denoiser is given", "one, for denoised maps")
-    card = denoiser.card
-    if card.axis != pairs.axis or set(card.null_bins) != set(pairs.null_bins):
-        raise Sd2Error(
-            f"The denoiser {card.name} knows {card.axis.words}",
-            f"the {pairs.axis.words} of the pairs",
-        )
-    if abs(pairs.frame_rate_hz / card.frame_rate_hz - 1.0) > matching.SAME_RATE:
-        raise Sd2Error(
-            f"The denoiser {card.name} knows {card.frame_rate_hz:g} frames/s",
-            f"the pairs' {pairs.frame_rate_hz:g} frames/s",
-        )
 
 
 # -- Noise floors, so that maps of any receiver are known ----------------------------------------
