@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -82,6 +83,8 @@ class StudyData:
     # Likewise, of people whom no radar saw.
     others: tuple[Movement, ...]
     pairs: PairSet | None  # Without its takes; None where there is no input to learn from.
+    described: dict[Any, dict[int, Any]] = field(default_factory=dict)
+    """What each learner is shown of real clips, by their identity: as long as these are there."""
 
     @property
     def lost_frames(self) -> int:
@@ -104,14 +107,18 @@ _READ_FOR = {"title", "out", "data", "video", "labels", "classes", "placements"}
 """Keys of a plan that tell what is read."""
 
 
-def study_data_of(plan: StudyPlan) -> StudyData:
-    """Read the data of a plan whose paths are absolute; once for plans of the same data."""
-    return _study_data_of(plan.model_dump_json(include=_READ_FOR))
+def kept_study_data(plan: StudyPlan, content: str) -> StudyData:
+    """Data of a plan, read once for all plans of the same data and ``content``, a digest of it."""
+    return _kept_study_data(plan.model_dump_json(include=_READ_FOR), content)
 
 
 @lru_cache(maxsize=1)
-def _study_data_of(plan_text: str) -> StudyData:
-    plan = StudyPlan.model_validate_json(plan_text)
+def _kept_study_data(plan_text: str, content: str) -> StudyData:
+    return study_data_of(StudyPlan.model_validate_json(plan_text))
+
+
+def study_data_of(plan: StudyPlan) -> StudyData:
+    """Read the data of a plan whose paths are absolute."""
     stores, sets, takes, own = _sources(plan)
     names = {name for one in sets for name in one.classes}
     pairs = None

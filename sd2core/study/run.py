@@ -141,7 +141,9 @@ def _made(
             futures = {}
             for path in missing:
                 place = str(places[path]) if learns else None
-                futures[client.submit(run_task, text, place, tasks[path], pure=False)] = path
+                futures[client.submit(run_task, text, content, place, tasks[path], pure=False)] = (
+                    path
+                )
             for future in finished(futures):
                 run = future.result()
                 runs[futures[future]] = run

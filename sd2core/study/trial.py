@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache, reduce
+from functools import reduce
 from operator import add
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.errors import Sd2Error
 from sd2core.labels.per_frame import BACKGROUND
 from sd2core.pairs.store import Take
-from sd2core.study.data import Movement, StudyData, study_data_of
+from sd2core.study.data import Movement, StudyData, kept_study_data
 from sd2core.study.denoisers import denoiser_in
 from sd2core.study.folds import Fold, folds_of, groups_of, share_of
 from sd2core.study.plan import Learner, StudyPlan
@@ -108,10 +108,21 @@ def grouped(plan: StudyPlan, data: StudyData, seed: int) -> Mapping[tuple[str, s
     return groups_of(data.known, data.real, parts, seed)
 
 
-def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
-    """Judge all conditions of a task; ``denoiser`` is the folder of its own."""
+def run_task(plan_text: str, content: str, denoiser: str | None, task: Task) -> Run:
+    """Judge all conditions of a task.
+
+    Parameters
+    ----------
+    plan_text : str
+        The plan, as JSON.
+    content : str
+        Digest of its data: a process that knows others reads them again.
+    denoiser : str, optional
+        Folder of the task's own.
+    task : Task
+    """
     plan = StudyPlan.model_validate_json(plan_text)
-    data = study_data_of(plan)
+    data = kept_study_data(plan, content)
     group = grouped(plan, data, task.seed)
     real = drawn(plan, data, task.fold.real, task.share, task.seed)
     judged = [one for one in data.real if group[one.clip.key] == task.fold.judged]
@@ -125,7 +136,7 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
     scores: dict[str, dict[str, Score]] = {}
     missing: dict[str, str] = {}
     learner = plan.classifiers[0]
-    describe = _kept(plan_text, learner)
+    describe = _describing_once(data, learner)
     for condition in (REAL, *plan.wanted):
         try:
             added = _added(plan, data, condition, filmed, model, reason, task.seed)
@@ -139,7 +150,7 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
     if task.share == max(plan.shares):
         for other in plan.classifiers[1:]:
             scores[other.title] = _judged(
-                other, plan, data, real, [], judged, task.seed, _kept(plan_text, other)
+                other, plan, data, real, [], judged, task.seed, _describing_once(data, other)
             )
     return Run(
         task,
@@ -252,13 +263,11 @@ def _denoiser(plan: StudyPlan, data: StudyData, folder: str | None) -> tuple[Any
     return model, ""
 
 
-@lru_cache(maxsize=8)
-def _kept(plan_text: str, learner: Learner) -> Describe:
+def _describing_once(data: StudyData, learner: Learner) -> Describe:
     """Describe clips for ridge regression; what the radar saw of whole movements only once."""
-    data = study_data_of(StudyPlan.model_validate_json(plan_text))
     describe = describing(learner, data.known)
     whole = {id(one.clip) for one in data.real}
-    kept: dict[int, Features] = {}
+    kept: dict[int, Features] = data.described.setdefault(learner, {})
 
     def described(clip: Clip) -> Features:
         if id(clip) not in whole:

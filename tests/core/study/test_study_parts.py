@@ -23,7 +23,7 @@ from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
 from sd2core.study.certainty import adjusted, gain_of
-from sd2core.study.data import StudyData, study_data_of
+from sd2core.study.data import StudyData, kept_study_data, study_data_of
 from sd2core.study.folds import folds_of, groups_of, share_of
 from sd2core.study.plan import Learner, StudyPlan, read_study, study_text
 from sd2core.study.report import _points, conclusion, findings_of, untried, write_report
@@ -119,7 +119,9 @@ def test_labels_become_classes_or_are_left_out(store: Path, data: StudyData) -> 
     assert data.known.classes == ("a", "b", "c")
     assert len(data.real) == len(data.filmed) == 12
     # How often it is judged changes nothing of what is read.
-    assert study_data_of(plan_of(store, seeds=7)) is study_data_of(plan_of(store))
+    kept = kept_study_data(plan_of(store, seeds=7), "one")
+    assert kept_study_data(plan_of(store), "one") is kept
+    assert kept_study_data(plan_of(store), "other") is not kept
     classes = {"a": "x", "c": "x", "b": "y"}
     fewer = study_data_of(plan_of(store, classes=classes))
     assert fewer.known.classes == ("x", "y")

@@ -106,6 +106,21 @@ def test_runs_are_of_the_denoiser_that_its_file_holds(
     assert late_s.min() == pytest.approx(6 / 30)
 
 
+def test_data_that_have_changed_are_read_again_by_all(
+    plan: Path, in_this_process: list[int]
+) -> None:
+    """Workers of a scheduler live on, and so does a notebook."""
+    chosen = read_study(plan).model_copy(update={"shares": (1.0,), "added": ()})
+    first = run_study(chosen)
+    pairs = plan.parent / "pairs.zarr"
+    label_pairs(pairs, [TakeLabel("*", f"t{number}", "abc"[number % 3]) for number in range(4)])
+    again = run_study(chosen)
+    assert len(in_this_process) == len(first.runs) + len(again.runs)
+    for results, classes in ((first, ("a", "b")), (again, ("a", "b", "c"))):
+        assert results.classes == classes
+        assert {one.scores[REAL].classes for one in results.runs} == {classes}
+
+
 def test_a_study_that_cannot_be_is_no_study_that_was_stopped(
     plan: Path, in_this_process: list[int]
 ) -> None:
