@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +23,6 @@ from sd2core.pairs.summary import names_together, pair_facts
 from sd2core.sensor import VelocityAxis
 
 _LARGEST_WEIGHT, _MIN_LEVEL = 8.0, 1e-3
-
-RANGE_LAW = 4.0
-"""Echo power falls with the fourth power of the range (radar equation)."""
 
 
 @dataclass(frozen=True)
@@ -317,42 +313,6 @@ def _too_short(takes: Sequence[Take], length: int) -> Sd2Error:
         "takes that are at least as long as a segment",
         "Choose shorter segments with --segment-frames",
     )
-
-
-class Draw(NamedTuple):
-    """Segments in the order in which they are learnt from; all of shape (segments,)."""
-
-    indices: NDArray[np.int64]
-    gains: NDArray[np.float32]  # of power
-    shares: NDArray[np.float64]
-    """Where between its earliest and latest place each is cut, from 0 to below 1."""
-
-
-@dataclass(frozen=True)
-class Order:
-    """Order in which segments are learnt from; depends on seed and epoch alone."""
-
-    segments: int
-    batch_size: int
-    seed: int
-    range_factor: float = 1.0  # gains are drawn for ranges up to this factor nearer or farther
-
-    @property
-    def steps(self) -> int:
-        """Batches per epoch; the last may be smaller."""
-        return -(-self.segments // self.batch_size)
-
-    def epoch(self, number: int) -> Draw:
-        """Segments of an epoch, in training order."""
-        rng = np.random.default_rng([self.seed, number])
-        indices = rng.permutation(self.segments)
-        exponent = rng.uniform(-1.0, 1.0, self.segments)
-        gains = (self.range_factor ** (-RANGE_LAW * exponent)).astype(np.float32)
-        return Draw(indices, gains, rng.uniform(0.0, 1.0, self.segments))
-
-    def part(self, step: int) -> slice:
-        """Slice of :meth:`epoch` that is a batch."""
-        return slice(step * self.batch_size, (step + 1) * self.batch_size)
 
 
 def _by_take(takes: tuple[Take, ...]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:

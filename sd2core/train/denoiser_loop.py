@@ -50,7 +50,7 @@ class DenoiserLoop(Loop):
         *,
         mixed: bool,
     ) -> None:
-        training, epoch_steps = config.training, batches.order.steps
+        training, epoch_steps = config.training, batches.steps
         timed = training.minutes is not None
         super().__init__(
             start.position,

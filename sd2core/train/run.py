@@ -28,7 +28,7 @@ from sd2core.processes import end_with_parent, lower_priority
 from sd2core.runs.control import Control
 from sd2core.runs.progress import ProgressWriter
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
-from sd2core.train.data import Order, TrainingData, prepare, read_mixed
+from sd2core.train.data import TrainingData, prepare, read_mixed
 from sd2core.train.denoiser_loop import DenoiserLoop
 from sd2core.train.evaluation import check_fits, learnt_from
 from sd2core.train.folder import TrainingFolder
@@ -130,14 +130,14 @@ def carry_out(
                 meeting = stack.enter_context(beside)
             stack.enter_context(joined(ranks, meeting, device))
         learnt = config.training
-        order = Order(len(data.training), learnt.batch_size, learnt.seed, config.data.range_factor)
+        drawn = learnt.batch_size, learnt.seed, config.data.range_factor
         loop = DenoiserLoop(
             config,
             folder,
             writer,
             control,
             Learner(network, data.training, validator, config),
-            Batches(order, data.training, rank, ranks.count),
+            Batches(data.training, *drawn, rank, ranks.count),
             validator,
             start or Checkpoint({}, {}, Position(), {"data_digest": digest, "threads": threads}),
             lambda best, live, epoch: facts.save(folder.best, network, best, live, epoch),

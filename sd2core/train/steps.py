@@ -7,10 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from sd2core.denoise.model import Denoiser
 from sd2core.options.training import TrainingConfig
-from sd2core.train.data import Order, Windows
+from sd2core.train.data import Windows
+
+_RANGE_LAW = 4.0
+"""Echo power falls with the fourth power of the range (radar equation)."""
 
 
 class Batch(NamedTuple):
@@ -25,26 +29,49 @@ class Batch(NamedTuple):
 
 
 class Batches:
-    """Batches of every epoch; with several processes (``ranks``) each takes its share of them."""
+    """Batches of every epoch, each in an order that depends on seed and epoch alone.
 
-    def __init__(self, order: Order, windows: Windows, rank: int = 0, ranks: int = 1) -> None:
-        self.order = order
-        self._windows = windows
+    Parameters
+    ----------
+    windows : Windows
+    size : int
+        Segments of a batch; the last one of an epoch may be smaller.
+    seed : int
+    range_factor : float
+        Gains are drawn for ranges up to this factor nearer or farther.
+    rank, ranks : int
+        Number of this process, and of all, each of which takes its share of every batch.
+    """
+
+    def __init__(
+        self, windows: Windows, size: int, seed: int, range_factor: float = 1.0,
+        rank: int = 0, ranks: int = 1,
+    ) -> None:  # fmt: skip
+        self.steps = -(-len(windows) // size)  # of an epoch
+        self._windows, self._size, self._seed, self._factor = windows, size, seed, range_factor
         self._rank, self._ranks = rank, ranks
-        self._epoch, self._whole = -1, (np.zeros(0, np.int64), np.zeros(0, np.float32))
+        self._epoch, self._drawn = -1, (np.zeros(0, np.int64), np.zeros(0, np.float32))
 
     def at(self, epoch: int, step: int) -> Batch:
         """Batch of a step of an epoch, both from 0."""
         if epoch != self._epoch:
-            indices, gains, shares = self.order.epoch(epoch)
-            self._epoch, self._whole = epoch, (self._windows.places(indices, shares), gains)
-        parts = [each[self.order.part(step)] for each in self._whole]
+            self._epoch, self._drawn = epoch, self._draw(epoch)
+        begin = step * self._size
+        parts = [each[begin : begin + self._size] for each in self._drawn]
         if self._ranks > 1:
             # All have as many, as a mean over processes wants it.
             count = len(parts[0])
             own = np.arange(-(-count // self._ranks)) * self._ranks + self._rank
             parts = [part[own % count] for part in parts]
         return Batch(*map(torch.from_numpy, parts))
+
+    def _draw(self, epoch: int) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """Starts and gains of all segments, in the order of an epoch."""
+        rng, count = np.random.default_rng([self._seed, epoch]), len(self._windows)
+        indices = rng.permutation(count)
+        gains = self._factor ** (-_RANGE_LAW * rng.uniform(-1.0, 1.0, count))
+        starts = self._windows.places(indices, rng.uniform(0.0, 1.0, count))
+        return starts, gains.astype(np.float32)
 
 
 def optimiser_of(model: Denoiser, config: TrainingConfig) -> torch.optim.AdamW:

@@ -18,7 +18,6 @@ from sd2core.options.training import DataConfig, TrainingConfig
 from sd2core.pairs.store import read_pairs
 from sd2core.sensor import VelocityAxis
 from sd2core.train.data import (
-    Order,
     Windows,
     frame_weights,
     prepare,
@@ -257,52 +256,48 @@ class TestFrameWeights:
 class TestOrder:
     @given(st.integers(1, 60), st.integers(1, 20), st.integers(0, 5), st.integers(0, 1000))
     def test_every_segment_once(self, segments: int, size: int, seed: int, epoch: int) -> None:
-        order = Order(segments, size, seed)
-        indices, gains, shares = order.epoch(epoch)
-        batches = [indices[order.part(step)] for step in range(order.steps)]
-        assert sorted(np.concatenate(batches)) == list(range(segments))
-        assert all(len(batch) for batch in batches)
-        assert (gains == 1.0).all()
-        assert ((shares >= 0.0) & (shares < 1.0)).all()
+        order = Batches(windows(segments), size, seed)
+        batches = [order.at(epoch, step) for step in range(order.steps)]
+        starts = np.concatenate([batch.start for batch in batches])
+        assert sorted(starts // 6) == list(range(segments))
+        assert set(starts % 6) <= {0, 1, 2}
+        assert all(len(batch.start) for batch in batches)
+        assert all((batch.gain == 1.0).all() for batch in batches)
 
     def test_it_depends_on_seed_and_epoch_alone(self) -> None:
-        first = Order(50, 8, 7, range_factor=2.0).epoch(3)
-        again = Order(50, 8, 7, range_factor=2.0).epoch(3)
-        assert all(np.array_equal(*two) for two in zip(first, again, strict=True))
-        assert not np.array_equal(first[0], Order(50, 8, 8).epoch(3)[0])
-        assert not np.array_equal(first[0], Order(50, 8, 7).epoch(4)[0])
+        def starts(seed: int, epoch: int) -> list[int]:
+            return Batches(windows(50), 50, seed, 2.0).at(epoch, 0).start.tolist()
+
+        assert starts(7, 3) == starts(7, 3)
+        assert starts(7, 3) != starts(8, 3)
+        assert starts(7, 3) != starts(7, 4)
 
     def test_gains_follow_the_range_law(self) -> None:
-        gains = Order(20_000, 64, 0, range_factor=1.5).epoch(0)[1]
+        gains = Batches(windows(20_000), 20_000, 0, range_factor=1.5).at(0, 0).gain.numpy()
         # Half again as near or as far: 1.5⁴ in power. Logarithms are spread evenly.
         assert 1.5**-4 <= gains.min() < 1.02 * 1.5**-4
         assert 0.98 * 1.5**4 < gains.max() <= 1.5**4 * (1 + 1e-6)
         assert abs(np.log(gains).mean()) < 0.05
 
     def test_a_batch_depends_on_its_place_alone(self) -> None:
-        order = Order(10, 4, 1, range_factor=2.0)
-        batches = Batches(order, windows(10))
+        batches = Batches(windows(10), 4, 1, 2.0)
         places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]
         taken = {place: batches.at(*place) for place in places}
         assert [len(batch.start) for batch in taken.values()] == [4, 4, 2, 4, 4, 2]
         for place in reversed(places):
-            found = Batches(order, windows(10)).at(*place)
+            found = Batches(windows(10), 4, 1, 2.0).at(*place)
             assert torch.equal(found.start, taken[place].start)
             assert torch.equal(found.gain, taken[place].gain)
-        indices, gains, _ = order.epoch(1)
-        assert (taken[1, 2].start // 6).tolist() == indices[8:].tolist()
-        assert taken[1, 2].gain.tolist() == gains[8:].tolist()
 
     @pytest.mark.parametrize("ranks", [2, 3])
     def test_processes_share_a_batch(self, ranks: int) -> None:
-        order = Order(11, 6, 1)
-        parts = [Batches(order, windows(11), rank, ranks) for rank in range(ranks)]
-        for step in range(order.steps):
+        alone = Batches(windows(11), 6, 1)
+        parts = [Batches(windows(11), 6, 1, 1.0, rank, ranks) for rank in range(ranks)]
+        for step in range(alone.steps):
             batches = [part.at(0, step) for part in parts]
             assert len({len(batch.start) for batch in batches}) == 1
-            indices = order.epoch(0)[0][order.part(step)]
-            found = torch.cat([batch.start for batch in batches]) // 6
-            assert set(found.tolist()) == set(indices)
+            found = torch.cat([batch.start for batch in batches])
+            assert set(found.tolist()) == set(alone.at(0, step).start.tolist())
 
 
 class TestOptimiser:
