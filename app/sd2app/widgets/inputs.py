@@ -70,12 +70,15 @@ class NumberBox(QDoubleSpinBox):
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMinimumWidth(72)
-        self.editingFinished.connect(lambda: self.lineEdit().setModified(False))
+        self._typing = False
+        self.lineEdit().textEdited.connect(self._begin_typing)
+        self.editingFinished.connect(self._end_typing)
 
     def show_value(self, value: float) -> None:
         """Follow a model, unless the user is typing; emits nothing."""
-        differs = abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals()
-        if differs and not self.lineEdit().isModified():
+        if self._typing:
+            return
+        if abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals():
             with QSignalBlocker(self):
                 self.setValue(value)
 
@@ -129,6 +132,7 @@ class NumberBox(QDoubleSpinBox):
         """End the editing with Return or Escape."""
         ends = event.key() in _ENDING_KEYS
         if event.key() == Qt.Key.Key_Escape:
+            self._end_typing()
             self.lineEdit().setText(
                 self.prefix() + self.textFromValue(self.value()) + self.suffix()
             )
@@ -159,6 +163,12 @@ class NumberBox(QDoubleSpinBox):
             super().wheelEvent(event)
         else:
             event.ignore()
+
+    def _begin_typing(self, text: str) -> None:
+        self._typing = True
+
+    def _end_typing(self) -> None:
+        self._typing = False
 
 
 def option_box(
