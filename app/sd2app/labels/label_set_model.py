@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from PySide6.QtGui import QIcon
 from sd2app.feature import Keys
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.record_table import Heading, Index, RecordTableModel
+from sd2app.widgets.record_table import Choosable, Heading, Index, RecordTableModel
 from sd2app.widgets.text import canonical, native
 from sd2core.labels.colours import OFFERED, Alike, alike
 from sd2core.labels.edits import Edit, Edits
@@ -38,7 +39,7 @@ HEADINGS = (
     Heading("Spans", "Number of spans with this label", number=True),
 )
 _FIELDS = ("name", "key", "colour", "gesture_class")
-NO_CLASS = "–"
+NO_CLASS, OTHER = "–", "other"
 _COLOURS = {colour: name for name, colour in OFFERED}
 
 
@@ -48,7 +49,6 @@ class LabelSetModel(RecordTableModel[Label]):
     def __init__(self, edits: LabelEdits, keys: Keys, parent: QObject | None = None) -> None:
         super().__init__(HEADINGS, parent)
         self._labels, self._apply, self._keys = edits.labels, edits.apply, keys
-        self.label_set = self._labels.labels.label_set  # in its order
         self.rows = self.label_set.labels
         self._counts: Counter[str] = Counter()
         self._alike: tuple[Alike, ...] = ()
@@ -59,21 +59,26 @@ class LabelSetModel(RecordTableModel[Label]):
         """Sentences on labels whose colours look alike; empty without any."""
         return " ".join(f"{one.words()}." for one in self._alike)
 
+    @property
+    def label_set(self) -> LabelSet:
+        """The set that is edited."""
+        return self._labels.labels.label_set
+
     def spans_of(self, row: int) -> int:
         """Return the number of spans with a label."""
         return self._counts[self.label_set.labels[row].name]
 
-    def classes(self) -> list[str]:
-        """Return the classes that a label can have; the empty one is not learnt."""
-        others = sorted(
-            {one.gesture_class for one in self.label_set.labels}.difference(CLASSES, {""})
-        )
-        return ["", *CLASSES, *others]
-
-    def colours(self) -> list[tuple[str, str]]:
-        """Return colours to choose from, names first: the palette and others in use."""
-        others = sorted({one.colour for one in self.label_set.labels}.difference(_COLOURS))
-        return [*OFFERED, *((colour, colour) for colour in others)]
+    def choices_at(self, index: Index) -> Sequence[Choosable]:
+        """Classes that a label can have, or colours: the palette, others in use, any other."""
+        used = {str(getattr(one, _FIELDS[index.column()])) for one in self.rows}
+        if index.column() == CLASS:
+            named = ["", *CLASSES, *sorted(used.difference(CLASSES, {""}))]
+            return [Choosable(one or NO_CLASS, one) for one in named]
+        if index.column() == COLOUR:
+            others = ((colour, colour) for colour in sorted(used.difference(_COLOURS)))
+            offered = [Choosable(name, one, swatch_icon(one)) for name, one in (*OFFERED, *others)]
+            return [*offered, Choosable("Other…", OTHER)]
+        return ()
 
     def add(self) -> bool:
         """Add a label with a name, a colour and a key not yet in use."""
@@ -112,18 +117,9 @@ class LabelSetModel(RecordTableModel[Label]):
 
     def _refresh(self) -> None:
         labels = self._labels.labels
-        count = len(labels.label_set.labels)
-        resized = count != len(self.label_set.labels)
-        if resized:
-            self.beginResetModel()
-        self.label_set = labels.label_set
-        self.rows = self.label_set.labels
         self._counts = Counter(span.label for span in labels.spans)
-        self._alike = alike(self.label_set.labels)
-        if resized:
-            self.endResetModel()
-        elif count:
-            self.dataChanged.emit(self.index(0, 0), self.index(count - 1, SPANS))
+        self._alike = alike(labels.label_set.labels)
+        self.show_rows(labels.label_set.labels)
 
     def _text(self, record: Label, column: int) -> str:
         if column == COLOUR:

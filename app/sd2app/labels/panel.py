@@ -29,7 +29,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.label_set_model import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
+from sd2app.labels.label_set_model import KEY, NAME, OTHER, LabelSetModel
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanFilter, SpanTableModel
@@ -42,14 +42,13 @@ from sd2app.widgets.inputs import Choice, SearchLine, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, InnerPages, outlined, show_words
 from sd2app.widgets.record_table import Heading, RecordTableModel
-from sd2app.widgets.table import CellTable, Choosable, FramedCells, ListedEditor, RecordTable
+from sd2app.widgets.table import CellTable, FramedCells, ListedEditor, RecordTable
 from sd2core.labels.files import read_label_set, write_label_set
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.statistics import HEADINGS, label_statistics, statistics_rows, statistics_text
 
 _WIDE = ("a name", "Key", "■ vermilion", "background", "Spans")
 _PADDING_PX = 14
-_OTHER = "other"
 _FILES = "Label set (*.json);;All files (*)"
 
 
@@ -160,7 +159,7 @@ class LabelSetTable(CellTable):
     def __init__(self, model: LabelSetModel, parent: QWidget) -> None:
         super().__init__("Label set", (Qt.Key.Key_Delete, Qt.Key.Key_Backspace), parent)
         self.setModel(model)
-        self.setItemDelegate(_LabelSetCells(model, self))
+        self.setItemDelegate(_LabelSetCells(self))
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         metrics = self.fontMetrics()
         for place, text in enumerate(_WIDE):
@@ -177,46 +176,33 @@ class LabelSetTable(CellTable):
 
 
 class _LabelSetCells(FramedCells):
-    """Lists for colours and classes, lines for names and keys."""
-
-    def __init__(self, model: LabelSetModel, parent: QWidget) -> None:
-        super().__init__(parent)
-        self._model = model
+    """A key is one character, and any colour can be asked for."""
 
     def createEditor(
         self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
     ) -> QWidget:
         """Make a list or a line."""
-        if index.column() == CLASS:
-            choices = [Choosable(one or NO_CLASS, one) for one in self._model.classes()]
-            return self.listed(choices, "Class", parent)
-        if index.column() == COLOUR:
-            choices = [
-                Choosable(name, one, swatch_icon(one)) for name, one in self._model.colours()
-            ]
-            return self.listed([*choices, Choosable("Other…", _OTHER)], "Colour", parent)
-        line = super().createEditor(parent, option, index)
-        if index.column() == KEY and isinstance(line, QLineEdit):
-            line.setMaxLength(1)
-        line.setAccessibleName("Key" if index.column() == KEY else "Name of the label")
-        return line
+        editor = super().createEditor(parent, option, index)
+        if index.column() == KEY and isinstance(editor, QLineEdit):
+            editor.setMaxLength(1)
+        return editor
 
     def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:
         """Set the value; any other colour is asked for once the list is closed."""
-        if isinstance(editor, ListedEditor) and editor.currentData() == _OTHER:
+        if isinstance(editor, ListedEditor) and editor.currentData() == OTHER:
             place = QPersistentModelIndex(index)
-            QTimer.singleShot(0, lambda: self._ask(place))
+            QTimer.singleShot(0, lambda: self._ask(place, model))
         else:
             super().setModelData(editor, model, index)
 
-    def _ask(self, place: QPersistentModelIndex) -> None:
+    def _ask(self, place: QPersistentModelIndex, model: QAbstractItemModel) -> None:
         if not place.isValid():
             return
         before, parent = QColor(place.data(Qt.ItemDataRole.EditRole)), self.parent()
         assert isinstance(parent, QWidget)
         colour = QColorDialog.getColor(before, parent.window(), "Colour of the label")
         if colour.isValid() and place.isValid():
-            self._model.setData(place, colour.name())
+            model.setData(place, colour.name())
 
 
 _ANY = {"label": "Any label", "track": "Any track"}

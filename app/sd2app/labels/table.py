@@ -16,44 +16,14 @@ from PySide6.QtGui import (
     QResizeEvent,
     QShowEvent,
 )
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QStyleOptionViewItem, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.model import LabelsModel
-from sd2app.labels.table_model import COLUMNS, SpanTableModel
+from sd2app.labels.table_model import COLUMNS, NOBODY, SpanTableModel
 from sd2app.session.session import Session
-from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.table import CellTable, Choosable, FramedCells
+from sd2app.widgets.table import CellTable, FramedCells
 
-
-class SpanCells(FramedCells):
-    """Editors of the cells: lists of labels and tracks, lines for everything else."""
-
-    def __init__(self, table: SpanTableModel, labels: LabelsModel, parent: QWidget) -> None:
-        super().__init__(parent)
-        self._table, self._labels = table, labels
-
-    def createEditor(
-        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
-    ) -> QWidget:
-        """Make a list or a line."""
-        column = COLUMNS[index.column()]
-        if column.listed is None:
-            line = super().createEditor(parent, option, index)
-            line.setAccessibleName(column.heading)
-            line.setToolTip(column.tip)
-            return line
-        coloured = column.id == "label"
-        colour_of = self._labels.labels.label_set.colour_of
-        choices = [
-            Choosable(one or _NOBODY, one, swatch_icon(colour_of(one)) if coloured else None)
-            for one in self._table.choices(column.listed)
-        ]
-        return self.listed(choices, column.heading, parent)
-
-
-_NOBODY = "Not told"
 _PADDING_PX = 8
 _HIDDEN = "span_table/hidden"
 _MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "delete_spans")
@@ -82,7 +52,7 @@ class SpanTable(CellTable):
         self._mirroring = False
         self._row = -1  # that was current last
         self.setModel(model)
-        self.setItemDelegate(SpanCells(model, edits.labels, self))
+        self.setItemDelegate(FramedCells(self))
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self._arrange_columns()
         self.clicked.connect(self._go)
@@ -271,7 +241,7 @@ class SpanTable(CellTable):
                 continue
             submenu = menu.addMenu(title)
             for choice in choices:
-                submenu.addAction(choice or _NOBODY, partial(run, choice))
+                submenu.addAction(choice or NOBODY, partial(run, choice))
         menu.addSeparator()
         menu.addActions([self._shell.action(name) for name in _MENU])
         menu.exec(event.globalPos())

@@ -11,7 +11,7 @@ from PySide6.QtGui import QIcon
 
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.record_table import Heading, Index, RecordTableModel
+from sd2app.widgets.record_table import Choosable, Heading, Index, RecordTableModel
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Change, Side
@@ -65,6 +65,7 @@ class Column:
 _START = Edge("start", lambda text, _, base: typed_start(text, base))
 _END = Edge("end", lambda text, _, base: typed_end(text, base))
 _DURATION = Edge("end", lambda text, span, base: typed_duration_end(text, span.start_s, base))
+NOBODY = "Not told"
 _TIMES = "seconds (1.5 or 1:02.5) or a frame (f48)"
 
 
@@ -255,8 +256,7 @@ class SpanTableModel(RecordTableModel[Span]):
     def _show(self, rows: list[Span]) -> None:
         """Show spans; what points at one of them goes along."""
         if rows and [span.id for span in rows] == [*self._row_of]:  # in the same order
-            self.rows = rows
-            self.dataChanged.emit(self.index(0, 0), self.index(len(rows) - 1, len(COLUMNS) - 1))
+            self.show_rows(rows)
             return
         self.layoutAboutToBeChanged.emit()
         held = self.persistentIndexList()
@@ -280,6 +280,15 @@ class SpanTableModel(RecordTableModel[Span]):
         return (
             swatch_icon(self._labels.labels.label_set.colour_of(record.label)) if coloured else None
         )
+
+    def choices_at(self, index: Index) -> Sequence[Choosable]:
+        """Labels, persons or tracks to choose from."""
+        listed = COLUMNS[index.column()].listed
+        colour_of, coloured = self._labels.labels.label_set.colour_of, listed == "label"
+        return [
+            Choosable(one or NOBODY, one, swatch_icon(colour_of(one)) if coloured else None)
+            for one in (self.choices(listed) if listed is not None else ())
+        ]
 
     # --- typing ---------------------------------------------------------------------------
 

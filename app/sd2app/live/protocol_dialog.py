@@ -160,13 +160,8 @@ class GestureRows(RecordTableModel[Gesture]):
 
     def _refresh(self) -> None:
         rows = tuple(Gesture(**one) for one in self._draft.value("gestures"))
-        if len(rows) != len(self.rows):
-            self.beginResetModel()
-            self.rows = rows
-            self.endResetModel()
-        elif rows != self.rows:
-            self.rows = rows
-            self.dataChanged.emit(self.index(0, 0), self.index(len(rows) - 1, CLASS))
+        if rows != self.rows:
+            self.show_rows(rows)
 
     def _text(self, record: Gesture, column: int) -> str:
         if column != CLASS or record.gesture_class:

@@ -25,6 +25,14 @@ class Heading(NamedTuple):
     editable: bool = False
 
 
+class Choosable(NamedTuple):
+    """One entry of a list in a cell."""
+
+    text: str  # shown to the user
+    value: str  # passed to the model
+    icon: QIcon | None = None
+
+
 class RecordTableModel(QAbstractTableModel, Generic[Record]):
     """Rows of records, kept up to date only while a view shows them.
 
@@ -48,6 +56,21 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
 
     def _refresh(self) -> None:
         """Assign the rows; without this they are assigned when there are others."""
+
+    def show_rows(self, rows: Sequence[Record]) -> None:
+        """Assign the rows; of as many as before only the cells are others."""
+        if rows and len(rows) == len(self.rows):
+            self.rows = rows
+            last = self.index(len(rows) - 1, len(self.headings) - 1)
+            self.dataChanged.emit(self.index(0, 0), last)
+            return
+        self.beginResetModel()
+        self.rows = rows
+        self.endResetModel()
+
+    def choices_at(self, index: Index) -> Sequence[Choosable]:
+        """Entries of the list that edits a cell; none where a line does."""
+        return ()
 
     def _text(self, record: Record, column: int) -> str:
         raise NotImplementedError

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
 
 from PySide6.QtCore import QAbstractItemModel, QEvent, QModelIndex, QRect, Qt
 from PySide6.QtGui import QHideEvent, QIcon, QKeyEvent, QPainter, QPalette, QShowEvent
@@ -21,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.widgets.inputs import claims
-from sd2app.widgets.record_table import RecordTableModel
+from sd2app.widgets.record_table import Choosable, RecordTableModel
 
 ROW_PX = 22
 
@@ -65,14 +64,6 @@ _OWN_KEYS = (
 _Move = QAbstractItemView.CursorAction
 
 
-class Choosable(NamedTuple):
-    """One entry of a list in a cell."""
-
-    text: str  # shown to the user
-    value: str  # passed to the model
-    icon: QIcon | None = None
-
-
 class ListedEditor(QComboBox):
     """A list in a cell. Letters choose from it, and fire no action of the window."""
 
@@ -91,11 +82,21 @@ class ListedEditor(QComboBox):
 class FramedCells(QStyledItemDelegate):
     """Frames the cell that has the keyboard, and knows lists besides lines of text."""
 
-    def listed(self, choices: Sequence[Choosable], name: str, parent: QWidget) -> ListedEditor:
-        """Make a list whose choice is taken at once."""
-        editor = ListedEditor(choices, name, parent)
-        editor.activated.connect(lambda _: self.take(editor))
-        return editor
+    def createEditor(
+        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
+    ) -> QWidget:
+        """Make a list, whose choice is taken at once, where the model has one, or a line."""
+        model = index.model()
+        assert isinstance(model, RecordTableModel)
+        heading = model.headings[index.column()]
+        if choices := model.choices_at(index):
+            editor = ListedEditor(choices, heading.text, parent)
+            editor.activated.connect(lambda _: self.take(editor))
+            return editor
+        line = super().createEditor(parent, option, index)
+        line.setAccessibleName(heading.text)
+        line.setToolTip(heading.tip)
+        return line
 
     def take(self, editor: QWidget) -> None:
         """End editing with what was chosen."""
