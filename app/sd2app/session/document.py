@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """Files to read, alone or beside those of a recording, and what is done with its new fields.
+    """Files to read, alone or beside those of a recording, and what is done once they are shown.
 
     Each of the ``groups`` goes beside, or in place of, what is before it; with it go fields of the
     recording that say how its mesh is read.
@@ -59,7 +59,7 @@ class _Asked:
 
     groups: tuple[tuple[Sequence[Path], Mapping[str, Any]], ...]
     base: Recording | None = None
-    then: Callable[[dict[str, Any]], object] = lambda fields: None
+    then: Callable[[dict[str, Any]], object] = lambda before: None
     cure: Cure | None = None
 
 
@@ -86,7 +86,6 @@ class DocumentModel(BackgroundModel):
         self.offers: tuple[OfferedCure, ...] = ()  # of reading the mesh another way
         self._asked: _Asked | None = None  # last
         self._shown: tuple[Path | None, Path | None] = None, None  # video and radar on screen
-        self._added: Content | None = None  # read already, before its fields are assigned
         self._runner = ListedRunner("open", jobs, self, self._receive)
         self._runner.failed.connect(self._offer_instead)
         # Not listed: cancelled, it would leave on screen what is no longer in the recording.
@@ -208,7 +207,7 @@ class DocumentModel(BackgroundModel):
     ) -> None:
         """Read files beside those of the recording that is open, in the background.
 
-        ``mesh`` is as for :meth:`open`; ``then`` is called with the fields to assign.
+        ``mesh`` is as for :meth:`open`; ``then`` is called with what changed fields were before.
         """
         assert self.recording is not None
         asked, pending = _Asked(((paths, mesh or {}),), replace(self.recording), then), self._asked
@@ -325,14 +324,13 @@ class DocumentModel(BackgroundModel):
             self.failed.emit(unread)
             self._offer(content.offers)
         else:
-            self._added = content
-            before, read = (
-                {name: getattr(one, name) for name in EDITED}
-                for one in (asked.base, content.recording)
-            )
-            asked.then({name: read[name] for name in EDITED if read[name] != before[name]})
-            if self._added is not None:  # the same files, which may hold something else by now
-                self._show_parts(content)
+            read, base, recording = content.recording, asked.base, self.recording
+            changed = [one for one in EDITED if getattr(read, one) != getattr(base, one)]
+            before = {name: getattr(recording, name) for name in changed}
+            for name in changed:
+                setattr(recording, name, getattr(read, name))
+            self._show_parts(content)  # also of the same files, which may hold something else
+            asked.then(before)
 
     def _open(self, content: Content, *, unsaved: bool) -> None:
         before, self.content = self.content, content
@@ -374,7 +372,7 @@ class DocumentModel(BackgroundModel):
 
     def _show_parts(self, content: Content) -> None:
         """Show what was read in what is open; the recording, its history and edits stay."""
-        before, self._added = self.content, None
+        before = self.content
         assert before is not None
         recording, read_by = before.recording, mesh_fields(content.recording)
         if _files(recording) != _files(content.recording):  # undone meanwhile
@@ -405,9 +403,6 @@ class DocumentModel(BackgroundModel):
         channel, mesh, files = _channel(recording), mesh_fields(recording), _files(recording)
         for name, value in fields.items():
             setattr(recording, name, value)
-        if self._added is not None:
-            self._show_parts(self._added)
-            return
         if _files(recording) != files:
             self._read_parts()
         elif mesh_fields(recording) != mesh:

@@ -99,7 +99,7 @@ class Edits:
             self._held = None
             self._sensor.set_dragging(False)
 
-    # --- sensor ---------------------------------------------------------------------------
+    # --- sensor and placements ------------------------------------------------------------
 
     def place_sensor(self, sensor: VirtualSensor, text: str = "Move sensor") -> None:
         """Place the sensor."""
@@ -128,8 +128,6 @@ class Edits:
         self._sensor.set_sensor(sensor)
         if self._document.recording is not None:
             self._document.recording.sensor = sensor
-
-    # --- placements -----------------------------------------------------------------------
 
     def plan_placements(self, placements: Placements | None) -> None:
         """Plan other places for sensors around the body, or none."""
@@ -220,15 +218,13 @@ class Edits:
             name = {Thing: "things", Body: "bodies", Wall: "walls"}[type(one)]
             self.change(f"{text} {one.name}", {name: change(getattr(recording, name))})
 
-    # --- labels ---------------------------------------------------------------------------
+    # --- labels and files -----------------------------------------------------------------
 
     def set_labels(self, text: str, labels: Labels) -> None:
         """Label the recording otherwise; undone, it has no labels of its own where it had none."""
         recording = self._document.recording
         if recording is not None and labels != self._document.labels:
             self._push(text, self._document.set_labels, recording.labels, labels)
-
-    # --- files ----------------------------------------------------------------------------
 
     def add(self, paths: Sequence[Path], mesh: Mapping[str, Any] | None = None) -> None:
         """Add files, a step once they were read; they are opened where nothing is open.
@@ -240,9 +236,10 @@ class Edits:
         else:
             self._document.read_added(paths, mesh, self._take_added)
 
-    def _take_added(self, fields: Mapping[str, Any]) -> None:
-        added = [WORDS[name] for name in ("video", "mesh", "radar", "imu") if fields.get(name)]
-        self.change(f"Add {' and '.join(added)}" if added else "Read files again", fields)
+    def _take_added(self, before: Mapping[str, Any]) -> None:
+        now = self._fields(name for name in ("video", "mesh", "radar", "imu") if name in before)
+        added = [WORDS[name] for name, path in now.items() if path]
+        self._push_change(f"Add {' and '.join(added)}" if added else "Read files again", before)
 
     def relink(self, folder: Path) -> Relinked | None:
         """Look for missing files below a folder; what was found is read again."""
@@ -274,7 +271,7 @@ class Edits:
         if recording is not None:
             self.read_mesh(cure.words, {"mesh_reading": recording.mesh_reading.cured(cure)})
 
-    # --- alignment of what was measured ---------------------------------------------------
+    # --- maps and what was measured -------------------------------------------------------
 
     def set_radar_offset(self, offset_s: float) -> None:
         """Align the capture."""
@@ -290,20 +287,14 @@ class Edits:
             shifted = {name: round(before + seconds, 3) for name, before in self._before.items()}
             self._document.assign(shifted)
 
-    # --- synthesis ------------------------------------------------------------------------
-
     def choose_count(self, count: HowCounted) -> None:
         """Count the vertices of synthetic maps another way."""
         self._push("Choose counting", self._document.set_count, self._document.count, count)
-
-    # --- processing of the capture --------------------------------------------------------
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""
         document = self._document
         self._push("Choose clutter removal", document.set_clutter, document.clutter, clutter)
-
-    # --- levels ---------------------------------------------------------------------------
 
     def set_references(self, references: Mapping[MapModel, float], *, by_hand: bool) -> None:
         """Show other values of maps as 0 dB."""
