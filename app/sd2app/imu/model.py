@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +30,6 @@ def place_words(place: str) -> str:
     return f"vertex {place}" if place.isdecimal() else place.replace("-", " ")
 
 
-class _Request(NamedTuple):
-    mesh: MeshSequence | None
-    places: tuple[str, ...]
-    current: str | None
-
-
 class ImuModel(ReportingModel):
     """Sensors of the recording, of which one is shown; its signals are computed in the background.
 
@@ -54,7 +48,7 @@ class ImuModel(ReportingModel):
         self.vertices: Mapping[str, int] = {}  # that sensors sit on, by their places
         self.folded = session.settings.stored(_FOLDED, False)
         self._chosen: str | None = None
-        self._request = _Request(None, (), None)
+        self._request: tuple[Any, ...] = (None,)  # mesh, places, current one
         self._known: dict[str, InertialSignals] = {}
         self._read: Path | None = None  # file that is read, or being read
         self._runner = LatestRunner("inertial sensor", self, self._receive, self._refuse)
@@ -180,20 +174,19 @@ class ImuModel(ReportingModel):
 
     def _follow(self) -> None:
         self._follow_file()
-        request = _Request(self._document.mesh, self.places, self.current)
+        mesh, places, current = request = self._document.mesh, self.places, self.current
         if request == self._request:
             return
-        if request.mesh is not self._request.mesh:
+        if mesh is not self._request[0]:
             self._known.clear()
             self.vertices = {}
         self._request, self.problem = request, ""
-        self.signals = None if request.current is None else self._known.get(request.current)
-        mesh, known = request.mesh, self.signals
-        if mesh is None or request.current is None:
+        self.signals = known = self._known.get(current or "")
+        if mesh is None or current is None:
             self._runner.cancel()
-            self.problem = "" if request.current is None else self.why_not
+            self.problem = "" if current is None else self.why_not
         else:
-            self._runner.submit(lambda emit: _feel(mesh, request, known, emit))
+            self._runner.submit(lambda emit: _feel(mesh, places, current, known, emit))
         self.changed.emit()
 
     def _take_seats(self, vertices: Mapping[str, int]) -> None:
@@ -201,9 +194,8 @@ class ImuModel(ReportingModel):
         self.changed.emit()
 
     def _receive(self, signals: InertialSignals) -> None:
-        if self._request.current is not None:
-            self._known[self._request.current] = self.signals = signals
-            self.changed.emit()
+        self._known[self._request[-1]] = self.signals = signals
+        self.changed.emit()
 
     def _refuse(self, error: Exception) -> None:
         self.problem = str(error)
@@ -256,20 +248,21 @@ class ImuModel(ReportingModel):
 
 
 def _feel(
-    mesh: MeshSequence, request: _Request, known: InertialSignals | None, emit: Emit
+    mesh: MeshSequence,
+    places: tuple[str, ...],
+    current: str,
+    known: InertialSignals | None,
+    emit: Emit,
 ) -> InertialSignals:
     """Compute in the background: where sensors sit first, then what the current one feels."""
     vertices, mesh = {}, mesh.body(mesh.persons[0] if mesh.others else None)
-    for place in request.places:
+    for place in places:
         try:
             vertices[place] = mounted(mesh, place).vertex
         except Sd2Error:
             continue  # said once it is the current one
     emit(vertices)
-    if known is not None:
-        return known
-    assert request.current is not None
-    return virtual_imu(mesh, request.current, progress=lambda *_: emit(None))
+    return known or virtual_imu(mesh, current, progress=lambda *_: emit(None))
 
 
 AXES = ("x", "y", "z")

@@ -119,10 +119,9 @@ class LabelEdits(QObject):
 
     def duplicate(self) -> None:
         """Copy the selected spans to the frame on screen; behind them where it is within them."""
-        chosen = self.labels.selected
+        chosen, ids, now_s = self.labels.selected, self._ids(), self._now_s
         if not chosen:
             return
-        ids, now_s = self._ids(), self._now_s
         first_s, last_s = chosen[0].start_s, max(span.end_s for span in chosen)
         start_s = last_s if first_s <= now_s < last_s else now_s
         self.apply(lambda now: now.duplicate(ids, start_s))
@@ -143,8 +142,8 @@ class LabelEdits(QObject):
 
     def restore(self) -> None:
         """Take over what an earlier session left unsaved, as one step."""
-        recording, offer = self._document.recording, self._session.offer
-        if recording is None or offer is None or self.refused():
+        offer = self._session.offer
+        if offer is None or self.refused():
             return
         others: dict[str, Any] = {}
         if offer.others is not None and self._session.changed_others(offer):
@@ -159,8 +158,7 @@ class LabelEdits(QObject):
     def take_state(self, name: str, state: State) -> None:
         """Take over labels and settings that were saved elsewhere, as one step."""
         recording = self._document.recording
-        if recording is None:
-            return
+        assert recording is not None
         self.applying.emit()
         now = recording.state()
         others = {one: value for one, value in state.settings.items() if value != now.settings[one]}

@@ -180,11 +180,10 @@ class CutOutModel(ReportingModel):
         self._session, self._synthesis = session, synthesis
         self._runner = ListedRunner("cut", session.jobs, self, self.noted.emit, self._fail)
 
-    def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
+    def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource:
         """Return the parts of the recording, without maps that are still computed."""
         content = self._session.document.content
-        if content is None:
-            return None
+        assert content is not None
         recording = content.recording
         whole = CutSource(
             recording.title,
@@ -218,7 +217,6 @@ class CutOutModel(ReportingModel):
         """Command for a terminal that cuts spans of the saved recording out, by their labels."""
         recording, source = self._session.document.recording, self.source(parts)
         assert recording is not None
-        assert source is not None
         maps, out = ",".join(source.maps) or None, Path("cuts")
         folder, shown = folder_for_command(recording), ",".join(parts)
         cut = CutCommand(recording=folder, out=out, label=labels, parts=shown, maps=maps)
@@ -249,8 +247,6 @@ class CutOutModel(ReportingModel):
             When no span has a frame of the recording.
         """
         source = self.source(parts)
-        if source is None:
-            return
         cuts = plan_cuts(source, spans, folder)
         others = [cut.path.name for cut in cuts if cut.state == "other"]
         replace_others = replaces(others) if others else False
@@ -276,8 +272,6 @@ class CutOutModel(ReportingModel):
 def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> None:
     """Ask for spans, parts and folder, and export the cut-outs."""
     source, groups = model.source(), _groups(labels.labels, labels.selected)
-    if source is None:
-        return
     if not groups[-1].spans:
         shell.warn("There is nothing to cut out: accept the suggestions first.")
         return

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
@@ -132,7 +132,6 @@ class LabelImportDialog(Dialog):
         )
         self._observation = Choice("Which of the videos in the file", self)
         self._observation.currentTextChanged.connect(self._observe)
-        self._observation_name = QLabel("Observation", self)
         self._facts = FactRows(_MAX_FACTS, at_the_edge=False, parent=self)
         self._message, self._consequence = sentence("", "warning"), sentence("")
         self._way = Choice("What becomes of the labels that are there", self, _WAYS)
@@ -144,9 +143,9 @@ class LabelImportDialog(Dialog):
         )
         self._mark.setSpecialValueText("the frame shown then")
         self._mark.valueChanged.connect(self._read)
-        form = form_of(
+        form = self._form = form_of(
             ("Read as", self._format),
-            (self._observation_name, self._observation),
+            ("Observation", self._observation),
             ("Marks become", self._mark),
         )
         take = form_of(("Take them", self._way))
@@ -239,8 +238,7 @@ class LabelImportDialog(Dialog):
     def _refresh(self) -> None:
         show_words(self._message, self.problem)
         self._facts.show_facts(self.facts())
-        for widget in (self._observation_name, self._observation):
-            widget.setVisible(bool(self.observations))
+        self._form.setRowVisible(self._observation, bool(self.observations))
         observed = self.observations.index(self._observed) if self._observed else -1
         self._observation.offer(self.observations, observed)
         self._consequence.setText(self.consequence())
