@@ -87,7 +87,7 @@ class DocumentModel(BackgroundModel):
         self._asked: _Asked | None = None  # last
         self._shown: tuple[Path | None, Path | None] = None, None  # video and radar on screen
         self._runner = ListedRunner("open", jobs, self, self._receive)
-        self._runner.failed.connect(self._offer_instead)
+        self._runner.failed.connect(lambda error: self._offer(offers_of([error]) or self.offers))
         # Not listed: cancelled, it would leave on screen what is no longer in the recording.
         self._reader = LatestRunner("files", self, self._show_parts)
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
@@ -234,10 +234,6 @@ class DocumentModel(BackgroundModel):
         if offers != self.offers:
             self.offers = offers
             self.offered.emit()
-
-    def _offer_instead(self, error: Exception) -> None:
-        if offers := offers_of([error]):
-            self._offer(offers)
 
     def follow(self, content: Content) -> None:
         """Show a recording that a radar's frames are added to, from now on by :meth:`grow`.

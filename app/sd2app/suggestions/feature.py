@@ -158,14 +158,15 @@ class SuggestionsFeature(Feature):
             ),
             Action(
                 "reject_suggestions", "Labels", "Reject all suggestions", ("Shift+W",),
-                "Let all go; they are not suggested again", model.reject_all, self._pending,
+                "Let all go; they are not suggested again",
+                lambda: model.reject(whole=True), self._pending,
             ),
         )  # fmt: skip
 
     def _accept_all(self) -> None:
         model, labels = self.model, self._edits.labels
         if not model.unnamed:
-            model.accept_all()
+            model.accept(whole=True)
             return
         names = [label.name for label in labels.labels.label_set.labels] or [labels.label]
         asked = f"Label of {counted(len(model.unnamed), 'span')} in which something moves:"
@@ -174,7 +175,7 @@ class SuggestionsFeature(Feature):
             self._shell.dialog_parent, "Accept all suggestions", asked, names, used_last, False
         )
         if accepted:
-            model.accept_all(label)
+            model.accept(label, whole=True)
 
     def _pending(self) -> bool:
         return bool(self.model.pending)

@@ -254,37 +254,23 @@ class SuggestionsModel(QObject):
         now_s = self._playback.time_s
         return tuple(span for span in self.pending if span.end_s > now_s)[:1] or self.pending[:1]
 
-    def accept(self, label: str | None = None) -> None:
-        """Accept the current suggestion with a label, and go to the next."""
-        self._take(self.current(), label, keep_known=label is None)
+    def accept(self, label: str | None = None, *, whole: bool = False) -> None:
+        """Accept the current suggestion with a label, and go to the next; or all.
 
-    def accept_all(self, label: str | None = None) -> None:
-        """Accept all, the unnamed ones with a label, by default the one used last."""
-        self._take(self.pending, label, keep_known=True)
-
-    def reject(self) -> None:
-        """Reject the current suggestion, and go to the next."""
-        self._reject(self.current())
-
-    def reject_all(self) -> None:
-        """Reject all."""
-        self._reject(self.pending)
-
-    def _take(self, spans: Sequence[Span], label: str | None, *, keep_known: bool) -> None:
-        if not spans:
-            return
+        Of all, those that have a label keep it. By default it is the one used last.
+        """
+        spans, known = self.pending if whole else self.current(), whole or label is None
         ids = [span.id for span in spans]
         track = self._labels.track or Labels().tracks[0].name
         given = label or self._labels.label
-        done = self._edits.apply(lambda now: take(now, ids, track, given, keep_known=keep_known))
-        if done:
+        if ids and self._edits.apply(lambda now: take(now, ids, track, given, keep_known=known)):
             self._go_on(spans[-1].start_s)
 
-    def _reject(self, spans: Sequence[Span]) -> None:
-        if not spans:
-            return
+    def reject(self, *, whole: bool = False) -> None:
+        """Reject the current suggestion, and go to the next; or all."""
+        spans = self.pending if whole else self.current()
         ids = [span.id for span in spans]
-        if self._edits.apply(lambda now: reject(now.labels, ids)):
+        if ids and self._edits.apply(lambda now: reject(now.labels, ids)):
             self._declined = (*self._declined, *spans)
             self._go_on(spans[-1].start_s)
 

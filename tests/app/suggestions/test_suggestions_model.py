@@ -150,12 +150,12 @@ def test_what_was_rejected_does_not_come_again(set_up) -> None:
 
 def test_all_at_once(set_up) -> None:
     set_up.look()
-    set_up.model.accept_all()
+    set_up.model.accept(whole=True)
     assert not set_up.model.pending
     assert len(set_up.labels.labels.of_track("Gestures")) == 4
     assert set_up.stack.undoText() == "Accept 3 suggestions"
     set_up.stack.undo()
-    set_up.model.reject_all()
+    set_up.model.reject(whole=True)
     assert len(set_up.labels.labels.spans) == 1
     set_up.look()
     assert not set_up.model.pending
