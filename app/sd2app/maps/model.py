@@ -115,7 +115,8 @@ class SynthesisModel(ReportingModel):
         self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
         # The mesh of the plan for dragging, and its masks from where the sensor rests.
-        self._prefetcher = LatestRunner("ready", self, self._note_masks, super()._fail)
+        self._masks_of: Request | None = None
+        self._prefetcher = LatestRunner("ready", self, self._take_masks, self._fail)
         # Asked for by the window and taken by the thread.
         self._next_sweep: deque[tuple[Callable[[Emit], Part], Postprocess | None]] = deque(maxlen=1)
         self._woken = threading.Event()  # by another sweep, or the end of what is made of one
@@ -257,7 +258,7 @@ class SynthesisModel(ReportingModel):
         self._synthesizers = synthesizers.among(mesh, options, files)
         self._partial.mark_stale()
         if options != synthesizers.options:
-            self._forget_masks()
+            self._masks_of = None
             self._accuracy.attach(mesh, options)
         self._set_moving(self.moving or dragging)
         self._follow()
@@ -349,18 +350,11 @@ class SynthesisModel(ReportingModel):
         self._partial.forget()
         self._reader.forget()
         self._plan: AccuracyPlan | None = None
-        self._dragging_plan: AccuracyPlan | None = None
-        self._forget_masks()
+        self._masks_of = None
         self._next_sweep.clear()
-        self._sweeping = False
 
-    def _forget_masks(self) -> None:
-        """Drop the masks: plan or mesh have changed."""
-        self._prefetcher.cancel()
-        self._masks_of: VirtualSensor | None = None
-
-    def _note_masks(self, swept: Part) -> None:
-        self._masks_of = swept.sensor
+    def _take_masks(self, masks: Request) -> None:
+        self._masks_of = masks
 
     def _announce(self) -> None:
         self.frame_changed.emit()
@@ -388,6 +382,7 @@ class SynthesisModel(ReportingModel):
     def _set_moving(self, moving: bool) -> None:
         if moving != self.moving:
             self.moving = moving
+            self._runner.cancel()  # it was at rest, or moved
             self.moving_changed.emit()
 
     def _sweep(self) -> None:
@@ -396,8 +391,7 @@ class SynthesisModel(ReportingModel):
         sweep = functools.partial(self._synthesizers.part, self._preview(), self._swept())
         self._next_sweep.append((sweep, self.postprocess()))
         self._woken.set()
-        if not (self._sweeping and self._runner.busy):
-            self._sweeping = True
+        if not self._runner.busy:
             self._runner.submit(self._sweep_on)
 
     def _sweep_on(self, emit: Emit) -> None:
@@ -429,7 +423,6 @@ class SynthesisModel(ReportingModel):
             return
         self._rest.stop()
         self._next_sweep.clear()
-        self._sweeping = False
         self._accuracy.surround(self._synthesizers.mesh)
         sensor = self._sensor
         self._accuracy.measured.rest_at(sensor)
@@ -474,11 +467,16 @@ class SynthesisModel(ReportingModel):
             self._accuracy.choose(self._sensor, self._budget_ms())
         elif not self.complete:
             self._settle()
-        elif self._dragging_plan is not None and self._masks_of != self._sensor:
-            masks = Request(self._sensor, self._dragging_plan, PREVIEW, "")
-            self._prefetcher.submit(
-                functools.partial(self._synthesizers.part, masks, self._swept())
-            )
+        elif (dragging := self._accuracy.while_dragging) is not None:
+            masks = Request(self._sensor, dragging.plan, PREVIEW, "")
+            synthesizers, swept = self._synthesizers, self._swept()
+
+            def prepare(emit: Emit) -> Request:
+                synthesizers.part(masks, swept, emit)
+                return masks
+
+            if masks != self._masks_of:
+                self._prefetcher.submit(prepare)
 
     def _may_choose(self) -> bool:
         """True if the plans are for another sensor and the kernels are compiled."""
@@ -487,13 +485,8 @@ class SynthesisModel(ReportingModel):
 
     def _take_plan(self) -> None:
         """Follow the plans; what was made by another stays until it is replaced."""
-        plan, dragging = (
-            use.plan if use is not None else None
-            for use in (self._accuracy.in_use, self._accuracy.while_dragging)
-        )
-        if dragging != self._dragging_plan:
-            self._dragging_plan = dragging
-            self._forget_masks()
+        in_use = self._accuracy.in_use
+        plan = None if in_use is None else in_use.plan
         if self._synthesizers is None or plan == self._plan:
             self._say_quality()
             return
@@ -520,7 +513,6 @@ class SynthesisModel(ReportingModel):
 
     def _finish(self, result: Any) -> None:
         self._receive(result)
-        self._sweeping = False
         if self._next_sweep and self._session.sensor.dragging:
             # It was asked for when the last one had just ended.
             self._sweep()
@@ -557,10 +549,6 @@ class SynthesisModel(ReportingModel):
             final = functools.partial(final_words, self._synthesizers, self._accuracy.in_use)
             self._partial.say_quality(self.frames_in_view(), final, self._compiler.busy)
 
-    def _fail(self, error: Exception) -> None:
-        self._sweeping = False
-        super()._fail(error)
-
     # --- helpers --------------------------------------------------------------------------
 
     def _preview(self) -> Request:
@@ -573,8 +561,10 @@ class SynthesisModel(ReportingModel):
             if plan.mask_reuse_m == 0:
                 return Request(here, plan, PREVIEW, words)
             known = self._masks_of
-            if known and math.dist(known.position_m, here.position_m) <= plan.mask_reuse_m:
-                return Request(here, plan, PREVIEW, words, "frozen")
+            if known is not None and known.plan == plan:
+                away_m = math.dist(known.sensor.position_m, here.position_m)
+                if away_m <= plan.mask_reuse_m:
+                    return Request(here, plan, PREVIEW, words, "frozen")
         # The masks of rest serve until one for dragging is known.
         newest = self._plan if synthesizers.ready(self._plan) else None
         if synthesizers.options.visibility == "none":
