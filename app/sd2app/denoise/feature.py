@@ -12,10 +12,11 @@ from sd2app.background.model_worker.client import DenoiserLibrary
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words
 from sd2app.feature import Action, Drop, Feature, Shell, report
-from sd2app.maps.feature import export_map
+from sd2app.maps.feature import MapExportDialog
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import accepted
 from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 
 _WORDS = Words(
@@ -111,5 +112,5 @@ class DenoiseFeature(Feature):
         return Drop("Denoise with this model", lambda: self._models.use(path))
 
     def _export(self) -> None:
-        name, model = self._session.document.file_name("-denoised.npz"), self.model
-        export_map("Export denoised map", name, model.line, model.export, self._shell)
+        name = self._session.document.file_name("-denoised.npz")
+        accepted(MapExportDialog("denoised", name, self.model, self._shell))

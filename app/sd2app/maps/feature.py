@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPixmap, QResizeEvent
@@ -34,43 +34,24 @@ from sd2core.files.tables import capitalised
 _ABOUT = "The map on screen as .npz with all that it was made from and with."
 
 
-def export_map(
-    title: str, name: str, line: Callable[[str], str], write: Callable[[Path], object], shell: Shell
-) -> None:
-    """Show the dialog, and write the map where it was accepted.
-
-    Parameters
-    ----------
-    title : str
-    name : str
-        Proposed for the file.
-    line : callable
-        Says the command that writes the map of the saved recording to a file of this name.
-    write : callable
-        Writes the map on screen.
-    shell : Shell
-    """
-    dialog = MapExportDialog(title, name, partial(line, name), shell.dialog_parent)
-    if accepted(dialog) and (path := dialog.path) is not None:
-        shell.attempt(lambda: write(path))
-
-
 class MapExportDialog(Dialog):
-    """Dialog that exports a map, with a copy of the command."""
+    """Dialog that exports the map of a model, with a copy of the command that makes it.
 
-    def __init__(self, title: str, name: str, line: Callable[[], str], parent: QWidget) -> None:
-        super().__init__(title, parent)
-        self.path: Path | None = None  # that was chosen
-        self._name = name
-        buttons = ExportButtons(self, self._ask)
-        foot = with_help("Export map", buttons, copy_button(line, self))
+    ``model`` gives the command for a file of a name (``line``) and writes one (``export``).
+    """
+
+    def __init__(self, kind: str, name: str, model: Any, shell: Shell) -> None:
+        super().__init__(f"Export {kind} map", shell.dialog_parent)
+        self._name, self._model, self._shell = name, model, shell
+        copy = copy_button(lambda: model.line(name), self)
+        foot = with_help("Export map", ExportButtons(self, self._ask), copy)
         self.setLayout(column_of(sentence(_ABOUT), foot, spacing_px=16, margins_px=16))
         self.setMinimumWidth(440)
 
     def _ask(self) -> None:
         if path := ask_new(self, self.windowTitle(), self._name, "Doppler map (*.npz)", ".npz"):
-            self.path = path
             self.accept()
+            self._shell.attempt(lambda: self._model.export(path))
 
 
 _MIN_M = 0.05
@@ -233,8 +214,8 @@ class MapsFeature(Feature):
         return LimbMenu(self.limbs, self._shell.dialog_parent)
 
     def _export(self) -> None:
-        name, synthesis = self._session.document.file_name("-synthetic.npz"), self.synthesis
-        export_map("Export synthetic map", name, synthesis.line, synthesis.export, self._shell)
+        name = self._session.document.file_name("-synthetic.npz")
+        accepted(MapExportDialog("synthetic", name, self.synthesis, self._shell))
 
     def stack(self, over_maps: Sequence[Overlay], over_all: Sequence[Overlay]) -> MapStack:
         """Maps one above the other, with what other features draw over them and the overview."""
