@@ -31,7 +31,7 @@ from sd2app.maps.quality import (
     budget_ms,
     final_words,
 )
-from sd2app.maps.readout import FrameReader, Readout
+from sd2app.maps.readout import Readout, torso_of
 from sd2app.session.content import UNTITLED, folder_for_command
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
@@ -39,7 +39,7 @@ from sd2app.widgets.text import quoted
 from sd2core.cli.synth import Synth
 from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer
+from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import deep_signature
 from sd2core.io.mesh_models import is_estimate
@@ -50,6 +50,8 @@ from sd2core.options.records import words_of
 from sd2core.options.synthesis import CHOSEN
 from sd2core.radar_profiles import BEAMS
 from sd2core.recording.recording import Recording
+from sd2core.scattering.amplitude import range_weight
+from sd2core.scattering.beam import share_in_beam
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -112,7 +114,6 @@ class SynthesisModel(ReportingModel):
         # Asked before each sweep what is to be made of it, and shown with it.
         self.postprocess: Callable[[], Postprocess | None] = lambda: None
         self._wanting_limbs: set[str] = set()
-        self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
         # The mesh of the plan for dragging, and its masks from where the sensor rests.
         self._masks_of: Request | None = None
@@ -182,9 +183,16 @@ class SynthesisModel(ReportingModel):
         return mesh.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)
 
     @property
+    def _index(self) -> int | None:
+        """Frame of the mesh on screen, None where there is no person."""
+        mesh = self._session.document.mesh
+        return None if mesh is None else mesh.person_at(self._session.playback.time_s)
+
+    @property
     def torso_m(self) -> Vector | None:
         """Median vertex of the frame on screen: inside the torso whatever the limbs do."""
-        return self._reader.torso_m()
+        mesh, index = self._session.document.mesh, self._index
+        return None if mesh is None or index is None else self._torso_of(mesh, index)
 
     @property
     def frame(self) -> FrameScattering | None:
@@ -192,21 +200,36 @@ class SynthesisModel(ReportingModel):
 
         None while a recording opens or kernels compile, until there is a map: that comes first.
         """
-        if self._synthesizers is None or self._track.map is None or self._compiler.busy:
+        index, synthesizers = self._index, self._synthesizers
+        if index is None or synthesizers is None or self._track.map is None or self._compiler.busy:
             return None
-        full = self._synthesizers.full
-        if full.options.visibility == "none":
-            return self._reader.scattering(full, "none")
-        if not self.moving:
-            return self._reader.scattering(full, full.options.visibility)
-        # The mask of the map, where the map has one and all vertices.
-        synthesizer = self._synthesizers.ready(self._plan)
-        same = synthesizer is not None and synthesizer.mesh is full.mesh
-        return self._reader.scattering(synthesizer if same and synthesizer else full, "frozen")
+        synthesizer = synthesizers.full
+        visibility: Visibility = synthesizer.options.visibility
+        if self.moving and visibility != "none":
+            # The mask of the map, where the map has one and all vertices.
+            visibility, made = "frozen", synthesizers.ready(self._plan)
+            if made is not None and made.mesh is synthesizer.mesh:
+                synthesizer = made
+        return self._scattering_of(synthesizer, self._sensor, index, visibility)
 
     def readout(self) -> Readout | None:
         """Numbers beside the sensor, None without a mesh on screen."""
-        return self._reader.readout(self.frame, self.v_max_mps)
+        mesh, index, frame, torso_m = (
+            self._session.document.mesh, self._index, self.frame, self.torso_m,
+        )  # fmt: skip
+        if mesh is None or index is None or frame is None or torso_m is None:
+            return None
+        sensor, within = self._sensor, None
+        seen_mps = np.abs(frame.velocity_mps[frame.visible])
+        if sensor.beam is not None:
+            echo = frame.visible * range_weight(frame.range_m, 4.0, 1.0)
+            within = share_in_beam(sensor, mesh.frame(index).T, echo)
+        return Readout(
+            torso_range_m=math.dist(sensor.position_m, torso_m),
+            visible_share=float(frame.visible.mean()),
+            beyond_share=float((seen_mps > self.v_max_mps).mean()) if seen_mps.size else 0.0,
+            share_in_beam=within,
+        )
 
     # --- requests -------------------------------------------------------------------------
 
@@ -348,7 +371,9 @@ class SynthesisModel(ReportingModel):
 
     def _forget(self) -> None:
         self._partial.forget()
-        self._reader.forget()
+        # What was read last is kept, as several views ask for the same.
+        newest = functools.lru_cache(maxsize=1)
+        self._scattering_of, self._torso_of = newest(Synthesizer.frame), newest(torso_of)
         self._plan: AccuracyPlan | None = None
         self._masks_of = None
         self._next_sweep.clear()

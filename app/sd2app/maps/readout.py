@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
 from sd2app.widgets.time_axis import clock_text
-from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.scattering.amplitude import range_weight
-from sd2core.scattering.beam import share_in_beam
 from sd2core.sensor import Vector
 
 
@@ -27,57 +24,8 @@ class Readout:
     share_in_beam: float | None  # None without a beam
 
 
-class FrameReader:
-    """Reads the frame on screen; what was read last is kept, as several views ask for the same."""
-
-    def __init__(self, session: Session) -> None:
-        self._document, self._sensor = session.document, session.sensor
-        self._playback = session.playback
-        self.forget()
-
-    def forget(self) -> None:
-        """Drop what was read of an earlier recording."""
-        newest = lru_cache(maxsize=1)
-        self._scattering_of, self._torso_of = newest(Synthesizer.frame), newest(_torso_m)
-
-    def index(self) -> int | None:
-        """Frame of the mesh on screen, None where there is no person."""
-        mesh = self._document.mesh
-        return None if mesh is None else mesh.person_at(self._playback.time_s)
-
-    def torso_m(self) -> Vector | None:
-        """Median vertex: inside the torso whatever the limbs do."""
-        index, mesh = self.index(), self._document.mesh
-        return None if index is None or mesh is None else self._torso_of(mesh, index)
-
-    def scattering(
-        self, synthesizer: Synthesizer, visibility: Visibility
-    ) -> FrameScattering | None:
-        """Velocity, range and visibility of every vertex."""
-        index = self.index()
-        if index is None:
-            return None
-        return self._scattering_of(synthesizer, self._sensor.sensor, index, visibility)
-
-    def readout(self, frame: FrameScattering | None, v_max_mps: float) -> Readout | None:
-        """Numbers beside the sensor, None without a mesh on screen."""
-        torso_m, index, mesh = self.torso_m(), self.index(), self._document.mesh
-        if frame is None or torso_m is None or index is None or mesh is None:
-            return None
-        sensor, within = self._sensor.sensor, None
-        seen_mps = np.abs(frame.velocity_mps[frame.visible])
-        if sensor.beam is not None:
-            echo = frame.visible * range_weight(frame.range_m, 4.0, 1.0)
-            within = share_in_beam(sensor, mesh.frame(index).T, echo)
-        return Readout(
-            torso_range_m=float(np.linalg.norm(np.subtract(sensor.position_m, torso_m))),
-            visible_share=float(frame.visible.mean()),
-            beyond_share=float((seen_mps > v_max_mps).mean()) if seen_mps.size else 0.0,
-            share_in_beam=within,
-        )
-
-
-def _torso_m(mesh: MeshSequence, frame: int) -> Vector:
+def torso_of(mesh: MeshSequence, frame: int) -> Vector:
+    """Median vertex of a frame: inside the torso whatever the limbs do."""
     x, y, z = np.median(mesh.frame(frame), axis=0)
     return float(x), float(y), float(z)
 
@@ -107,6 +55,4 @@ def body_range_m(session: Session, time_s: float) -> float | None:
     frame = None if mesh is None else mesh.person_at(time_s)
     if mesh is None or frame is None:
         return None
-    return float(
-        np.linalg.norm(np.subtract(_torso_m(mesh, frame), session.sensor.sensor.position_m))
-    )
+    return math.dist(torso_of(mesh, frame), session.sensor.sensor.position_m)
