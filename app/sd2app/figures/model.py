@@ -89,6 +89,9 @@ class DrawnFigure(ProblemModel):
         raise NotImplementedError
 
     def _draw(self) -> None:
+        if self.exporting:  # what is chosen meanwhile does not end that
+            self.changed.emit()
+            return
         try:
             plot, _ = self._recipe()
         except Sd2Error as error:
@@ -123,6 +126,7 @@ class DrawnFigure(ProblemModel):
             self.exporting = False
             self.changed.emit()
             self.failed.emit(str(error))
+            self._draw()
         else:
             super()._refuse(error)
 

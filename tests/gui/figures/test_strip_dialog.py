@@ -74,6 +74,15 @@ def test_the_preview_follows_what_is_chosen(model, qtbot):
     assert model.options.rows == ("overlay",)  # the last one stays
 
 
+def test_what_is_chosen_while_a_file_is_written_does_not_end_that(model, qtbot, tmp_path):
+    settle(model, qtbot)
+    with qtbot.waitSignal(model.written, timeout=20_000):
+        model.export(tmp_path / "strip.png")
+        model.choose(count=3)
+    assert (tmp_path / "strip.png").exists()
+    assert not model.exporting
+
+
 def test_what_is_not_there_is_not_offered(empty_window, small_recording, qtbot):
     with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([small_recording / "video.mp4"])
