@@ -19,7 +19,6 @@ from sd2app.maps.quality import Postprocess
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
-from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.resample_to_model import input_of, is_regular
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
@@ -96,7 +95,6 @@ class DenoisedMap(BackgroundModel):
         self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
         self._texture: Texture | None = None
-        self._movements: KnownMovements | None = None
         self._sensor: object = None  # placement that the synthetic map is of
         self._held = False  # it follows the clock
         self._reached: _Reached | None = None  # by it; None: begin where it is
@@ -135,20 +133,14 @@ class DenoisedMap(BackgroundModel):
     # --- requests -------------------------------------------------------------------------
 
     def use(
-        self,
-        denoiser: RemoteDenoiser | None,
-        words: str = "",
-        *,
-        texture: Texture | None = None,
-        known: KnownMovements | None = None,
+        self, denoiser: RemoteDenoiser | None, words: str = "", texture: Texture | None = None
     ) -> None:
         """Denoise with another model, called ``words`` on the track, or not at all.
 
-        With a texture the map is drawn as the radar would show it; of the known movements is said
-        how many frames are others.
+        With a texture the map is drawn as the radar would show it.
         """
         self._stop()
-        self._texture, self._movements = texture, known
+        self._texture = texture
         self._took_s.clear()
         self.denoiser = denoiser
         self.words = words
@@ -341,7 +333,8 @@ class DenoisedMap(BackgroundModel):
         if shown is not None and key is not None and self._results.get(key) is None:
             kept = replace(shown, values=shown.values.copy())
             self._results.put(key, kept, kept.values.nbytes)
-        source, movements = self._synthetic.map, self._movements
+        source, denoiser = self._synthetic.map, self.denoiser
+        movements = None if denoiser is None else denoiser.card.known
         if source is not None and movements is not None:
             passed = int(movements.strange(source.values.T, source.axis).sum())
             if passed:

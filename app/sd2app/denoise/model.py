@@ -310,7 +310,7 @@ class DenoiseModel(ReportingModel):
         else:
             texture = loaded.card.texture if self.textured else None
             words = ("drawn · " if texture is not None else "") + origin_words(loaded.card)
-            self.map.use(loaded, words, texture=texture, known=loaded.card.known)
+            self.map.use(loaded, words, texture)
         self._show_before()
         self.changed.emit()
 

@@ -28,7 +28,6 @@ from sd2app.maps.quality import (
     Postprocess,
     Request,
     SynthesizerCache,
-    budget_ms,
     final_words,
 )
 from sd2app.maps.readout import Readout, torso_of
@@ -56,6 +55,10 @@ from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
+
+_MAP_BUDGET_MS = 15.0
+"""For one map while the sensor is dragged and the video plays: 20 of them a second, with most
+of the time left to drawing."""
 
 _REST_MS = 300
 """Pause of a drag that counts as rest."""
@@ -631,5 +634,7 @@ class SynthesisModel(ReportingModel):
         return (0, self._partial.frames) if self._is_short else self.frames_in_view()
 
     def _budget_ms(self) -> float:
+        """Time budget per frame, in steps, so that a little zooming needs no other plan."""
         start, stop = self._swept()
-        return budget_ms(stop - start)
+        steps = math.ceil(2 * math.log2(max(stop - start, 1)))
+        return float(_MAP_BUDGET_MS / 2 ** (steps / 2))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import threading
 import time
 from collections import OrderedDict
@@ -27,10 +26,6 @@ from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
-
-_MAP_BUDGET_MS = 15.0
-"""For one map while the sensor is dragged and the video plays: 20 of them a second, with most
-of the time left to drawing."""
 
 AT_ONCE = 12_000_000
 """Vertices times frames that are swept in one go: roughly in a few ms up to some 20 ms."""
@@ -157,12 +152,6 @@ class Request(NamedTuple):
     quality: int  # rank of the computed frames
     words: str  # the same for people
     visibility: Visibility | None = None  # None: that of the synthesizer's options
-
-
-def budget_ms(frames: int) -> float:
-    """Time budget per frame, in steps, so that a little zooming needs no other plan."""
-    steps = math.ceil(2 * math.log2(max(frames, 1)))
-    return float(_MAP_BUDGET_MS / 2 ** (steps / 2))
 
 
 def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
