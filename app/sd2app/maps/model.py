@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import itertools
 import math
 import threading
@@ -613,10 +612,9 @@ class SynthesisModel(ReportingModel):
 
     @property
     def _files(self) -> str:
-        """Hash of what tells files of the scene apart: two meshes may be alike in some frames."""
+        """What tells files of the scene apart: two meshes may be alike in some frames."""
         recording = self._session.document.recording
-        files = [] if recording is None else deep_signature(recording.scene_files)
-        return hashlib.sha256(str(files).encode()).hexdigest()
+        return "" if recording is None else str(deep_signature(recording.scene_files))
 
     @property
     def _at_once(self) -> int:
