@@ -76,7 +76,7 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     """
     from PySide6.QtWidgets import QApplication
 
-    from sd2app.training.feature import TrainingPanel
+    from sd2app.training.feature import TrainingRunView
     from sd2app.training.run import EpochPoint, StepPoint
     from sd2app.widgets.chart import ChartView
 
@@ -95,7 +95,7 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     history.step_points = [
         StepPoint(at, 0.1 + rng.random() / at) for at in np.linspace(0.25, 500, 2000)
     ]
-    curves = window.findChild(TrainingPanel).findChild(ChartView)
+    curves = window.findChild(TrainingRunView).findChild(ChartView)
 
     def update() -> float:
         began_s = time.thread_time()

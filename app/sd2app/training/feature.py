@@ -198,30 +198,6 @@ _PAD = 1.12
 _MIN_RATIO = 1.6
 
 
-class TrainingPanel(RunPanel):
-    """Panel of the trainings of denoisers."""
-
-    def __init__(
-        self,
-        training: TrainingModel,
-        adoption: ModelAdoption,
-        display: DisplayModel,
-        document: DocumentModel,
-        shell: Shell,
-    ) -> None:
-        def open_run() -> None:
-            if path := ask_folder(shell.dialog_parent, "Folder of a run"):
-                shell.attempt(lambda: training.open_run(path))
-
-        super().__init__(
-            training,
-            TrainingSetupView(training, document, shell),
-            TrainingRunView(training, adoption, display, shell),
-            "Runs: those under way, and those that have ended",
-            ("Open a run…", open_run),
-        )
-
-
 class TrainingRunView(RunView[TrainingMonitor]):
     """Curves and figures of a training, and what its model gains while it is in use."""
 
@@ -336,6 +312,12 @@ def _drawable(points: Collection[tuple[float, float]]) -> list[tuple[float, floa
     return [(x, y) for x, y in points if math.isfinite(y) and y > 0]
 
 
+def open_run(training: TrainingModel, shell: Shell) -> None:
+    """Let the user choose the folder of a run, and show it."""
+    if path := ask_folder(shell.dialog_parent, "Folder of a run"):
+        shell.attempt(lambda: training.open_run(path))
+
+
 def may_leave(training: TrainingModel, parent: QWidget) -> bool:
     """True if the window may close; decides on a run under way."""
     run = training.to_be_left()
@@ -406,8 +388,12 @@ class TrainingFeature(Feature):
 
     def panel(self) -> QWidget:
         """Page of the Train panel."""
-        s = self._session
-        return TrainingPanel(self.model, self.adoption, s.display, s.document, self._shell)
+        s, shell = self._session, self._shell
+        setup = TrainingSetupView(self.model, s.document, shell)
+        run = TrainingRunView(self.model, self.adoption, s.display, shell)
+        other = "Open a run…", partial(open_run, self.model, shell)
+        tip = "Runs: those under way, and those that have ended"
+        return RunPanel(self.model, setup, run, tip, other)
 
     def may_close(self) -> bool:
         """Ask what becomes of a run under way."""

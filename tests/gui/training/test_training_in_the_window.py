@@ -18,7 +18,7 @@ from sd2app.background import run_monitor
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
-from sd2app.training.feature import TrainingPanel
+from sd2app.training.feature import TrainingSetupView
 from sd2app.training.model import PairMaker
 from sd2core.pairs.store import read_pairs
 from sd2core.train.folder import TrainingFolder
@@ -59,7 +59,7 @@ def made(qtbot, compiled_kernels, fake, fake_models, monkeypatch):
 
 
 def click(window: MainWindow, qtbot, text: str) -> None:
-    panel = window.findChild(TrainingPanel)
+    panel = window.findChild(TrainingSetupView).parentWidget()
     found = [b for b in panel.findChildren(QToolButton) if b.text() == text and b.isVisible()]
     assert len(found) == 1, text
     qtbot.mouseClick(found[0], Qt.MouseButton.LeftButton)

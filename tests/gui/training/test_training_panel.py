@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -32,11 +33,12 @@ from sd2app.session.maps import MapModel
 from sd2app.session.session import Maps
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
-from sd2app.training.feature import TrainingPanel, TrainingRunView, may_leave
+from sd2app.training.feature import TrainingRunView, TrainingSetupView, may_leave, open_run
 from sd2app.training.model import TrainingModel
 from sd2app.training.result import ModelAdoption
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.run_panel import RunPanel
 from sd2app.widgets.theme import apply_theme
 from sd2core.errors import Sd2Error
 from sd2core.recording.recording import open_recording
@@ -101,7 +103,10 @@ class Window:
         self.display = DisplayModel()
         self.document = SimpleNamespace(recording=None, modified=False)
         shell = SayingShell(self.said)
-        self.panel = TrainingPanel(self.training, self.use, self.display, self.document, shell)
+        setup = TrainingSetupView(self.training, self.document, shell)
+        run = TrainingRunView(self.training, self.use, self.display, shell)
+        other = "Open a run…", partial(open_run, self.training, shell)
+        self.panel = RunPanel(self.training, setup, run, "Runs", other)
         self.side = SidePanel({"Train": self.panel}, QAction("Over maps"))
         self.side.resize(300, 520)
         self.side.show()
