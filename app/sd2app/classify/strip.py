@@ -63,9 +63,6 @@ class ClassStrip(QWidget):
 
     def _say(self) -> None:
         model = self._classify
-        parent = self.parentWidget()
-        if not (self.isVisible() if parent is None else self.isVisibleTo(parent)):
-            return
         if model.problem:
             self._status.setText(model.problem)
         elif model.loading or model.track.card is None:
