@@ -63,10 +63,11 @@ def launch(
 def last_output(output: Path) -> str:
     """End of what a program printed; empty where there is nothing."""
     try:
-        content = output.read_bytes()[-_KEPT_BYTES:]
+        with output.open("rb") as stream:
+            stream.seek(max(stream.seek(0, os.SEEK_END) - _KEPT_BYTES, 0))
+            return stream.read().decode("utf-8", "replace").strip()
     except OSError:
         return ""
-    return content.decode("utf-8", "replace").strip()
 
 
 class CommandFolder(RunFolder):
