@@ -33,7 +33,7 @@ from sd2app.widgets.canvas import tick_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import ask_folder
 from sd2app.widgets.inputs import CheckBox, Choice
-from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
+from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
 from sd2app.widgets.model_page import model_title
 from sd2app.widgets.panel import ElidedLabel, FactRows, Fold, ProgressBar, outlined, sentence, title
 from sd2app.widgets.run_panel import Button, Field, RunPanel, RunView, RunWords, TrainingForm
@@ -224,7 +224,12 @@ class TrainingRunView(RunView[TrainingMonitor]):
         )  # fmt: skip
         super().__init__(training, shell, RunWords(headline, remedy_text), buttons)
         self._training, self._adoption = training, adoption
-        self._gain = TrainingGainView(adoption)
+        self._summary, self._gains = sentence(""), FactRows(3, at_the_edge=True, parent=self)
+        tip = "Draw the map of the model before under that of this one"
+        self._both = CheckBox("Show the map from before", self, adoption.denoise.set_comparing, tip)
+        back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
+        both = row_of(self._both, STRETCH, back)
+        self._gain = pane(title("In use"), self._summary, self._gains, both, spacing_px=4)
         empty = training_chart(TrainingHistory())
         self._curves = ChartView(display, "Errors over the epochs", empty)
         self._metrics = FactRows(3, at_the_edge=False, parent=self)
@@ -236,9 +241,13 @@ class TrainingRunView(RunView[TrainingMonitor]):
         self.add(self._gain, self._curves, self._metrics, self._about, self._closing)
 
     def show_made(self, run: TrainingMonitor) -> None:
-        """Follow curves and figures."""
-        history = run.history
-        self._gain.setVisible(self._adoption.run == run.path)
+        """Follow curves and figures, and what the model gains while it is in use."""
+        history, use = run.history, self._adoption
+        self._gain.setVisible(use.run == run.path)
+        self._summary.setText(gain_summary(use.gain, use.has_radar, is_old=use.is_old))
+        self._gains.show_facts(gain_rows(use.gain) if use.gain is not None else [])
+        self._both.show_checked(use.denoise.comparing)
+        self._both.setVisible(use.previous is not None)
         self._curves.show_chart(training_chart(history))
         self._curves.setVisible(bool(history.epoch_points or history.step_points))
         self._metrics.show_facts(metric_rows(history))
@@ -249,35 +258,6 @@ class TrainingRunView(RunView[TrainingMonitor]):
 
 def _can_pause(run: TrainingMonitor) -> bool:
     return run.under_way and run.phase not in ("starting", "pausing", "paused")
-
-
-class TrainingGainView(QWidget):
-    """A view of :class:`ModelAdoption`."""
-
-    def __init__(self, adoption: ModelAdoption) -> None:
-        super().__init__()
-        self._adoption = adoption
-        self._summary = sentence("")
-        self._table = FactRows(3, at_the_edge=True, parent=self)
-        self._both = CheckBox(
-            "Show the map from before",
-            self,
-            adoption.denoise.set_comparing,
-            "Draw the map of the model before under that of this one",
-        )
-        back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
-        buttons = row_of(self._both, STRETCH, back)
-        parts = title("In use"), self._summary, self._table, buttons
-        self.setLayout(column_of(*parts, spacing_px=4, margins_px=0))
-        adoption.changed.connect(self._refresh)
-        self._refresh()
-
-    def _refresh(self) -> None:
-        use = self._adoption
-        self._summary.setText(gain_summary(use.gain, use.has_radar, is_old=use.is_old))
-        self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
-        self._both.show_checked(use.denoise.comparing)
-        self._both.setVisible(use.previous is not None)
 
 
 def training_chart(history: TrainingHistory) -> Chart:
