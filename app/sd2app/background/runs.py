@@ -140,6 +140,8 @@ class Runs(ClosingModel, Generic[Run]):
     shown_by: ClassVar[str] = "The Train panel"
     environment: ClassVar[Mapping[str, str]] = ONE_THREAD
     """Of commands: what moves on the screen comes first, where they get by with one processor."""
+    setup: Any = None
+    """Set-up of a new one, a :class:`RunSetup`, whose data is read again when they are shown."""
 
     changed = Signal()
     ended = Signal(object)  # the run in view came to its end
@@ -159,7 +161,6 @@ class Runs(ClosingModel, Generic[Run]):
         self.under_way = False  # true while the run in view has a process
         self.known: tuple[KnownRun, ...] = ()  # on disk, the newest first
         self._taking_up = self._watched = False
-        self._set_up: RunSetup[Any] | None = None
         self._lister = LatestRunner("runs", self, self._list)
         self._timer = QTimer(self, interval=_LIST_MS)
         self._timer.timeout.connect(self.refresh)
@@ -217,11 +218,6 @@ class Runs(ClosingModel, Generic[Run]):
         """Share of the run in view that is done; None while that is not known."""
         return None if self.run is None else self.run.history.share
 
-    def follow_setup(self, setup: RunSetup[Any]) -> None:
-        """Follow the set-up of a new run; its data is read again whenever runs become visible."""
-        self._set_up = setup
-        setup.changed.connect(self.changed)
-
     # --- one run after another --------------------------------------------------------------
 
     def set_watched(self, watched: bool) -> None:
@@ -229,8 +225,8 @@ class Runs(ClosingModel, Generic[Run]):
         self._watched = watched
         if watched:
             self.refresh()
-            if self._set_up is not None:
-                self._set_up.refresh()
+            if self.setup is not None:
+                self.setup.refresh()
 
     def look_for_runs(self) -> None:
         """At the start of the program: find what is under way, or what was in view last."""

@@ -49,7 +49,7 @@ class BatchModel(Runs[BatchMonitor]):
         self._refusal = ""
         take, refuse = self._take_estimate, self._refuse_estimate
         self._estimating = LatestRunner("estimate", self, take, refuse)
-        self.follow_setup(self.setup)
+        self.setup.changed.connect(self.changed)
         self.results.changed.connect(self.changed)
         self.changed.connect(self._estimate_if_seen)
 

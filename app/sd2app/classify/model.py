@@ -198,7 +198,7 @@ class ClassifyModel(ReportingModel, SpanFinder):
         self._settings.set_paths(_MODEL, [self.path] if self.path is not None else [])
         self._settings.set_value(_NONE, self.path is None)
         self._asleep = False
-        self._set_card(card)
+        self.card = card
         self.track.use(None)
         if path is not None:
             self.set_shown(True)
@@ -239,10 +239,8 @@ class ClassifyModel(ReportingModel, SpanFinder):
         if source is not self.track.source:
             self.track.look_at(source)
             self.changed.emit()
-        asked = self.path is not None and not self._asleep
-        waiting = asked and self.track.card is None and not self._problem
-        about_to = self._runner.busy or self._patience.isActive()
-        if waiting and source is not None and not about_to:
+        waits = self.path is not None and source is not None and self.track.card is None
+        if waits and not (self._asleep or self._problem or self.busy):
             self._patience.start()
 
     def _load(self) -> None:
@@ -254,12 +252,9 @@ class ClassifyModel(ReportingModel, SpanFinder):
             self._runner.submit(lambda emit: library.load(path))
         self.changed.emit()
 
-    def _set_card(self, card: ClassifierCard | None) -> None:
-        self.card = card
-        self.track.look_at(self.source)
-
     def _set_loaded(self, loaded: RemoteClassifier) -> None:
-        self._set_card(loaded.card)
+        self.card = loaded.card
+        self.track.look_at(self.source)
         self.track.use(loaded)
         self.changed.emit()
 

@@ -345,7 +345,7 @@ class ClassTraining(Runs[ClassRun]):
         super().__init__(settings, self._classifiers / "runs", parent, command)
         self._use = use
         self.setup = ClassSetup(settings, self)
-        self.follow_setup(self.setup)
+        self.setup.changed.connect(self.changed)
         self._used: Path | None = None
 
     @property

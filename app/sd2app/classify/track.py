@@ -53,9 +53,8 @@ class _Reached(NamedTuple):
     answered: int  # answers of frames from here on are owed until there are more frames
 
 
-class _Answers(NamedTuple):
-    pieces: list[tuple[int, NDArray[np.float32]]]  # first frames, and shares from there on
-    reached: _Reached | None
+_Answers = tuple[list[tuple[int, NDArray[np.float32]]], _Reached | None]
+"""First frames with the shares from there on, and how far a stretch has come that grows."""
 
 
 class ClassTrack(BackgroundModel):
@@ -223,10 +222,10 @@ class ClassTrack(BackgroundModel):
         )
 
     def _receive(self, answers: _Answers) -> None:
-        for start, shares in answers.pieces:
+        pieces, self._reached = answers
+        for start, shares in pieces:
             self.shares[start : start + len(shares)] = shares
             self.done[start : start + len(shares)] = True
-        self._reached = answers.reached
         if self._asked != self._revision:
             self._go_on()
         self.changed.emit()
@@ -269,4 +268,4 @@ def _answers(
             owed = round(card.delay_s * cut.timebase.frames_per_s) if is_open[stop] else 0
             shares = classifier.probabilities(cut)
             pieces.append((start, shares[: max(len(shares) - owed, 0)]))
-    return _Answers(pieces, reached)
+    return pieces, reached

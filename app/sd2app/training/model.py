@@ -153,7 +153,7 @@ class TrainingModel(Runs[TrainingMonitor]):
         folder = folder or (Path(chosen) if chosen else user_data("runs"))
         super().__init__(settings, folder, parent, command)
         self.setup = TrainingSetupModel(settings, self)
-        self.follow_setup(self.setup)
+        self.setup.changed.connect(self.changed)
         self.pair_maker = PairMaker(folder.parent / "pairs", self, command)
         self.pair_maker.changed.connect(self.changed)
         self.pair_maker.made.connect(self.setup.add)
