@@ -74,7 +74,7 @@ class History:
                 continue
             try:
                 reader(event)
-            except (KeyError, TypeError, ValueError, OverflowError):
+            except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
                 continue
             taken = True
         return taken
@@ -91,10 +91,7 @@ class History:
 def reason_in(event: Mapping[str, Any]) -> str:
     """Reason of a failure that a line reports as a JSON object; empty without one."""
     error = event.get("error")
-    if not isinstance(error, dict):
-        return ""
-    found, *more = (str(error.get(part) or "") for part in ("found", "expected", "remedy"))
-    return str(Sd2Error(found, more[0], more[1]))
+    return str(Sd2Error(**error)) if isinstance(error, dict) else ""
 
 
 class _Status(NamedTuple):

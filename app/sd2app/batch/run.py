@@ -114,11 +114,6 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         """True if the same command would go on with it."""
         return not self.under_way and self.phase != "gone" and self.facts.has_plan
 
-    def _settle(self) -> None:
-        super()._settle()
-        if not self.under_way:
-            plan_of(self.path).unlink(missing_ok=True)
-
 
 STEP_WORDS = {
     "inspect": "Look at recordings",
