@@ -30,8 +30,7 @@ UNDER_WAY: tuple[Phase, ...] = (
 """Phases with a process."""
 
 POLL_MS = 250
-SLOW_POLL_MS = 1000
-"""Interval for paused or ended runs, which may be resumed or deleted elsewhere."""
+"""Interval between two looks, also at runs that have ended: they may be resumed elsewhere."""
 _CANCEL_PATIENCE_S = 30.0
 """After that a process that does not react to its cancellation is killed."""
 _CLOSING_S = 10.0
@@ -308,10 +307,7 @@ class RunMonitor(ClosingModel, Generic[F]):
 
     def _settle(self) -> None:
         """Take over another phase."""
-        under_way = self.phase in UNDER_WAY
-        rests = not under_way or self.phase == "paused"
-        self._timer.setInterval(SLOW_POLL_MS if rests else self.poll_ms or POLL_MS)
-        if under_way:
+        if self.phase in UNDER_WAY:
             return
         self._request = None
         output = self.folder.output

@@ -47,7 +47,6 @@ FAKE = Path(__file__).resolve().parents[2] / "fake_batch.py"
 def quick(monkeypatch) -> None:
     """Look more often than a person would."""
     monkeypatch.setattr(run_monitor, "POLL_MS", 30)
-    monkeypatch.setattr(run_monitor, "SLOW_POLL_MS", 30)
 
 
 @pytest.fixture

@@ -51,7 +51,6 @@ FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
 def quick(monkeypatch) -> None:
     """Look more often than a person would."""
     monkeypatch.setattr(run_monitor, "POLL_MS", 40)
-    monkeypatch.setattr(run_monitor, "SLOW_POLL_MS", 40)
 
 
 class FakeDenoising(QObject):
