@@ -329,15 +329,11 @@ class RunMonitor(ClosingModel, Generic[F]):
 
 
 class CommandRun(RunMonitor[CommandFolder]):
-    """A command of ``sd2`` under way, or one that has ended.
-
-    Its ``facts`` are whether there is a result.
-    """
+    """A command of ``sd2`` under way, or one that has ended."""
 
     folders = CommandFolder
     result_name: ClassVar[str] = ""
     """Of the file that is its result; empty where there is none."""
-    facts: Any = False
 
     def __init__(
         self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
@@ -353,11 +349,8 @@ class CommandRun(RunMonitor[CommandFolder]):
     @property
     def result(self) -> Path | None:
         """Result; None where there is nothing yet."""
-        return self.out / self.result_name if self.facts else None
-
-    def inspect(self) -> Any:
-        """Look for a result."""
-        return bool(self.result_name) and (self.out / self.result_name).is_file()
+        path = self.out / self.result_name
+        return path if self.result_name and path.is_file() else None
 
 
 def _is_begun_by(process: ProcessId | None, launched: ProcessId) -> bool:
