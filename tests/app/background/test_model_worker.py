@@ -70,7 +70,7 @@ def process():
     process = ModelProcess()
     yield process
     process.close()
-    assert not process.running
+    assert not any(COMMAND[-1] in one.cmdline() for one in psutil.Process().children())
 
 
 def test_the_answer_is_that_of_the_library(process, folder):

@@ -40,11 +40,6 @@ class ModelProcess:
         self._lock = threading.Lock()
         self._closed = False
 
-    @property
-    def running(self) -> bool:
-        """True while there is a process."""
-        return self._process is not None and self._process.poll() is None
-
     def ask(self, do: str, *arguments: Any) -> Any:
         """Call a method of its ``Worker``; raises what that raises, or Sd2Error if it is gone."""
         with self._lock:
