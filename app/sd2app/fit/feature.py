@@ -49,7 +49,7 @@ class FitOnScreen(QObject):
         self.following = True
         self._moving = False
         self._notes = ""
-        fit.advanced.connect(self._follow)
+        fit.changed.connect(self._follow)
         fit.state_changed.connect(self._restart)
         fit.finished.connect(self._take)
         for signal in (fit.changed, session.document.changed):
@@ -96,13 +96,14 @@ class FitOnScreen(QObject):
             self.following = following
             self.changed.emit()
 
-    def _follow(self, frame: int) -> None:
-        video = self._document.video
-        if not (self.following and self.visible) or video is None or frame >= len(video):
+    def _follow(self) -> None:
+        video, progress = self._document.video, self._fit.progress
+        frame = None if progress is None or not self._fit.busy else progress.newest
+        if not (self.following and self.visible) or video is None or frame is None:
             return
         self._moving = True
         try:
-            self._playback.seek(video.timebase.time_of(frame))
+            self._playback.seek(video.timebase.time_of(min(frame, len(video) - 1)))
         finally:
             self._moving = False
 

@@ -149,8 +149,7 @@ State = Literal["idle", "running", "cancelling", "stopped", "failed", "finished"
 class FitModel(QObject):
     """At most one fit at a time; a stopped one can be continued, also after a restart."""
 
-    changed = Signal()  # state, stage or count; at most ten times a second while running
-    advanced = Signal(int)  # landmarks of this frame (and some before) are there; as often
+    changed = Signal()  # state, stage, count or landmarks; at most ten times a second
     finished = Signal(object)  # FitRequest: the mesh is written
     state_changed = Signal()  # the state alone
 
@@ -303,15 +302,9 @@ class FitModel(QObject):
         self._run = run
         if run is not None:
             run.history.landmarks = self._landmarks  # goes on from a stopped one's
-            run.changed.connect(self._tell)
+            run.changed.connect(self.changed)
             run.ended.connect(self._end)
             self._set_state("running")
-
-    def _tell(self) -> None:
-        self.changed.emit()
-        if self._run is not None and self._run.history.newest is not None:
-            newest, self._run.history.newest = self._run.history.newest, None
-            self.advanced.emit(newest)
 
     def _end(self) -> None:
         run, request = self._run, self.request

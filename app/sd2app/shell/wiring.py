@@ -67,7 +67,7 @@ class Features:
             session,
             shell,
             self.fit.landmarks_at,
-            (self.fit.model.advanced, self.fit.model.changed),
+            (self.fit.model.changed,),
             lambda menu, place: self.labels.offer_frame(menu, place),
         )
         self.training = TrainingFeature(session, shell, denoise.model, parts.train_command)
