@@ -94,10 +94,10 @@ def check_regular(path: Path) -> None:
         )
 
 
-def check_there(path: Path, expected: str) -> None:
+def check_there(path: Path, expected: str, remedy: str = "Check the path") -> None:
     """Raise Sd2Error if there is nothing at a path, or what :func:`check_regular` refuses."""
     if not path.exists():
-        raise Sd2Error(f"{path} does not exist", expected, "Check the path")
+        raise Sd2Error(f"{path} does not exist", expected, remedy)
     check_regular(path)
 
 

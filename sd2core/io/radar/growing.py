@@ -158,7 +158,7 @@ def frame_count(folder: Path, head: GrowingHead) -> int:
     sizes = []
     for name in (SAMPLES_NAME, INDEX_NAME):
         path = folder / name
-        check_there(path, _EXPECTED)
+        check_there(path, _EXPECTED, "Copy the whole folder")
         sizes.append(path.stat().st_size)
     return min(sizes[0] // head.frame_bytes, sizes[1] // ENTRY.itemsize)
 
