@@ -42,7 +42,7 @@ SHARED = Path(os.environ.get("SD2_SHARED_DATA", REPOSITORY.parent / "shared" / "
 _HOURS = "hours of training, due with the next denoisers"
 OLD = {
     "performance.md": "needs an idle machine for an hour",
-    "fitting.md": "ten idle minutes; fits are the same bit for bit",
+    "fitting.md": "ten idle minutes; since then only the frame after a cut is left empty",
     "range-synthesis.md": _HOURS,
     "paper.md": _HOURS,
     "denoiser.md": _HOURS,
