@@ -411,14 +411,6 @@ class Recording:
         """Take what is on disk as known, so that :meth:`save` writes over it."""
         self._read, self._base = theirs._read, theirs._base
 
-    def divergence(self, theirs: Recording) -> Divergence:
-        """Compare with the same recording as it is on disk by now."""
-        mine = self.state()
-        stored = theirs.state()
-        if self.labels_elsewhere:  # this one writes no labels
-            stored = replace(stored, labels=mine.labels)
-        return Divergence(self._base or mine, mine, stored)
-
     def _check_unchanged(self) -> None:
         if self._base is None:
             return
@@ -429,10 +421,13 @@ class Recording:
                 "Bring it back, or save the recording in another folder",
             )
         theirs = _opened(self.folder, labels=not self.labels_elsewhere)
-        divergence = self.divergence(theirs)
+        mine, stored = self.state(), theirs.state()
+        if self.labels_elsewhere:  # this one writes no labels
+            stored = replace(stored, labels=mine.labels)
+        divergence = Divergence(self._base, mine, stored)
         if divergence.changes:
             raise SavedElsewhereError(theirs, divergence)
-        self.accept(theirs)  # with fields that only a later version knows
+        self._read = theirs._read  # with fields that only a later version knows
 
     @property
     def _is_gone(self) -> bool:
