@@ -1,25 +1,23 @@
-"""Reading of the files that the command line names."""
+"""Reading of the files that the command line names; commands load this when they run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_pattern, plain_path
+from sd2core.io.beam_files import find_beam
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG
 from sd2core.options.records import given_flags
-
-if TYPE_CHECKING:
-    from sd2core.mesh.sequence import MeshSequence
-    from sd2core.options.shared import Axis, Looking, MeshAndSensor, MeshInput, MeshReading
-    from sd2core.recording.recording import MeshReading as StoredReading
-    from sd2core.recording.recording import Recording
-    from sd2core.sensor import VelocityAxis, VirtualSensor
-
+from sd2core.options.shared import Axis, Looking, MeshAndSensor, MeshInput, MeshReading
+from sd2core.placements.body_extent import BodyExtent
+from sd2core.recording.recording import MeshReading as StoredReading
+from sd2core.recording.recording import Recording, is_recording, open_recording
+from sd2core.sensor import VelocityAxis, VirtualSensor, aimed_at
 
 _AIM = "AZ,EL in degrees (up to ±360 and ±90), or body"
 _OF_ESTIMATORS = ("person", "image_size", "focal_px", "body_model")
@@ -28,8 +26,6 @@ _OF_THE_MESH = ("faces", "fps", "scale", "distance_m", "turn", *_OF_ESTIMATORS)
 
 def mesh_reading(options: MeshReading) -> StoredReading:
     """Options for reading a mesh from the command line."""
-    from sd2core.recording.recording import MeshReading as StoredReading
-
     alike = picked(options, "scale", "person", "distance_m", "turn", "image_size", "focal_px")
     model = None if options.body_model is None else str(plain_path(options.body_model))
     return StoredReading(frames_per_s=options.fps, body_model=model, **alike)
@@ -58,10 +54,6 @@ def looking(
     sensor: VirtualSensor, options: Looking, mesh: Callable[[], MeshSequence]
 ) -> VirtualSensor:
     """Sensor with the direction and the beam that are given; ``mesh`` is what ``body`` is about."""
-    from sd2core.io.beam_files import find_beam
-    from sd2core.placements.body_extent import BodyExtent
-    from sd2core.sensor import aimed_at
-
     if options.beam is not None:
         sensor = replace(sensor, beam=find_beam(options.beam))
     if options.aim == "body":
@@ -79,9 +71,6 @@ def looking(
 
 def mesh_and_its_sensor(options: MeshInput) -> tuple[MeshSequence, VirtualSensor]:
     """Mesh, and sensor of the recording or the camera."""
-    from sd2core.recording.recording import is_recording
-    from sd2core.sensor import VirtualSensor
-
     if not is_recording(options.mesh):
         return load_mesh_from_options(options.mesh, options), VirtualSensor()
     recording = open_recording_from_options(options.mesh, options)
@@ -98,8 +87,6 @@ def mesh_of(recording: Recording, options: MeshReading) -> MeshSequence:
 
 def open_recording_from_options(path: Path, options: MeshReading) -> Recording:
     """Open a recording; options on how to read its mesh replace the stored ones."""
-    from sd2core.recording.recording import open_recording
-
     recording = open_recording(path)
     if recording.bodies:  # of whom one may be named
         options = replace(options, person=None)
@@ -148,7 +135,5 @@ def refuse_unused_mesh_options(
 
 def chosen_axis(options: Axis, usual: VelocityAxis | None = None) -> VelocityAxis:
     """Velocity axis of ``--bins`` and ``--v-max``; what is not given is as usual."""
-    from sd2core.sensor import VelocityAxis
-
     usual = usual or VelocityAxis()
     return VelocityAxis(options.bins or usual.bins, options.v_max_mps or usual.v_max_mps)
