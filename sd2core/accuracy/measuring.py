@@ -139,7 +139,6 @@ class _Counts:
     def prepare(self, go_on: Callable[[], None]) -> None:
         """Compute what all plans are held against."""
         self._trial.reference(self._runs)
-        self._trial.load_kernels()
 
     def errors(self, plan: AccuracyPlan) -> Errors:
         """Errors against the reference."""

@@ -143,7 +143,7 @@ def survey_scene(
     single += [replace(base, left_out=(part,)) for part in trial.scene_parts]
     single = [plan for plan in single if plan != base]
     rates = [replace(base, frame_rate_factor=factor) for factor in FRAME_RATE_FACTORS]
-    total = len(single) + len(rates) + 3 + bool(mesh.others)
+    total = len(single) + len(rates) + 2 + bool(mesh.others)
     done = 0
 
     def step() -> None:
@@ -158,8 +158,6 @@ def survey_scene(
     reference = trial.reference(runs, progress=within)
     step()
     survey = Survey(trial, base, scene_facts(trial, within))
-    trial.load_kernels(within)
-    step()
     at_rate = {}
     for plan in rates:
         at_rate[plan] = trial.columns(plan, runs, progress=within)

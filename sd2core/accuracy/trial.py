@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan, visibility_plans
+from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan
 from sd2core.accuracy.results import Errors, compute_errors
 from sd2core.accuracy.sample import KEPT, Run, Sample, take_sample
 from sd2core.doppler.masks import Visibility
@@ -251,15 +251,6 @@ class Trial:
         if threads == 1:
             spent_s = sum(stretch.processor_s for stretch in stretches)
         return 1e3 * spent_s / sum(stop - start for start, stop in spans)
-
-    def load_kernels(self, progress: Progress = silent) -> None:
-        """Call the compiled kernels once, so that loading them from disk is not timed."""
-        for plan in visibility_plans(surface=self.mesh.faces is not None):
-            if plan.mask_stride == 1:
-                run = self.sample.runs[0]
-                first = [Run(run.start, run.start + 1, 0)]
-                synthesizer = self.synthesizer(plan, runs=first, progress=progress)
-                self._counted(synthesizer, first, self._aside(), progress=progress)
 
     def synthesizer(
         self,

@@ -138,13 +138,14 @@ def chosen(
         True if a budget also considers plans that keep a mask while the sensor moves.
     """
     from sd2core.accuracy.choosing import choose
-    from sd2core.numerics.compiled import warm_up
+    from sd2core.numerics.compiled import kernels_ready, warm_up
 
     tolerance = options.tolerance
     if tolerance is None and options.budget_ms is None:
         tolerance = _TOLERANCE
-    with progress_bar("Compiling", "file") as progress:
-        warm_up(progress)
+    if not kernels_ready():
+        with progress_bar("Compiling", "kernel") as progress:
+            warm_up(progress)
     with progress_bar("Choosing", "plan") as progress:
         return choose(
             mesh,
