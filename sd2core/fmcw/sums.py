@@ -93,7 +93,7 @@ def direct(
             go_on()
         some = slice(start, start + step)
         direct_sum(
-            *(each[some] for each in turns),
+            *Turns(*(each[some] for each in turns)),
             np.ascontiguousarray(amplitude[:, some]),
             -0.5 * (shape[1] - 1),
             -0.5 * shape[0],
