@@ -172,8 +172,6 @@ def _count(
         if mesh is None:
             vertices, nowhere = _FITTED_VERTICES[fit.resolution], (0.0, 0.0, 0.0)
             mesh = MeshInput("", "", video.frames, vertices, nowhere)
-    if graph.plan.synthesise is None:
-        return
     for planned in graph.maps_of(origin, inspection, mesh):
         for task in planned.tasks:
             steps[task.step].count(task, bool(mesh.identity) and graph.is_done(task), weight)

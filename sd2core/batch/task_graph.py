@@ -184,8 +184,6 @@ class TaskGraph:
         return Task("fit", key, origin, arguments, None, video.frames, origin.name, out)
 
     def _synthesis(self, origin: Origin, inspection: Inspection, mesh: MeshInput) -> Iterator[Task]:
-        if self.plan.synthesise is None:
-            return
         for planned in self.maps_of(origin, inspection, mesh):
             if self.model is not None:
                 self.total["denoise"] += len(planned.denoising) - 1
@@ -202,6 +200,8 @@ class TaskGraph:
         self, origin: Origin, inspection: Inspection, mesh: MeshInput
     ) -> Iterator[PlannedMap]:
         """Yield all maps of one recording, for a data set those of whom its labels name."""
+        if self.plan.synthesise is None:
+            return
         people = () if self.plan.export is None else inspection.people
         bodies = 1 + len(mesh.others_m) if people else 1
         sensors = self.plan.sensors(inspection.sensor, mesh.target_m)

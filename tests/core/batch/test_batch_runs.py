@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ from pools import SerialPool
 
 from sd2core.accuracy.plans import reference_plan
 from sd2core.batch.driver import AHEAD
+from sd2core.batch.fitting import facts_path
 from sd2core.batch.folder import BatchFolder
+from sd2core.batch.inputs import mesh_input_of
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.batch.tasks import Task
@@ -206,6 +209,24 @@ def test_a_video_needs_a_fit(run: Runs, tmp_path: Path) -> None:
     end = run(MAPS)
     assert end.failed == 1
     assert "[fit]" in run.report["failures"][0]["error"]["expected"]
+
+
+def test_a_plan_may_only_fit(run: Runs, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_spheres(run.folder / "meshes", 1)
+    write_video(run.folder / "meshes" / "film.mp4", frames=8)
+
+    def fitted(out: str, **_: object) -> None:
+        mesh = Path(out)
+        mesh.parent.mkdir(parents=True, exist_ok=True)
+        save_mesh(swinging_sphere(8, 1.1), mesh)
+        facts_path(mesh).write_text(json.dumps(asdict(mesh_input_of(mesh, mesh.stem))))
+
+    monkeypatch.setattr("sd2core.batch.fitting.fit_to_video", fitted)
+    for state in ("done", "there"):
+        end = run(PLAN + "[fit]\n")
+        assert (end.outcome, end.failed) == ("finished", 0)
+        assert end.facts[state] == {"inspect": 2, "fit": 1}
+    assert not BatchFolder(run.out).results.read_bytes()
 
 
 def test_a_lost_process_costs_its_current_task_only(run: Runs) -> None:
