@@ -215,11 +215,6 @@ class DenoisedMap(BackgroundModel):
             self.track.set_status(self.words)
             self._go_on()
 
-    def close(self) -> None:
-        """Stop computing."""
-        self._stop()
-        super().close()
-
     # --- live -----------------------------------------------------------------------------
 
     def _step(self) -> None:
