@@ -210,7 +210,7 @@ class TrainingRunView(RunView[TrainingMonitor]):
             Button(
                 "use", "Use this model", "Denoise with it, and compare with what was there before",
                 adoption.use,
-                lambda run: not run.under_way and run.facts.has_model and adoption.run != run.path,
+                lambda run: not run.under_way and run.has_model and adoption.run != run.path,
                 primary=True,
             ),
             Button("pause", "Pause", "Rest, and give the processor back", pause, _can_pause),

@@ -93,7 +93,7 @@ class ModelAdoption(ClosingModel):
     def use(self) -> None:
         """Denoise with the best model of the run in view, beside what was there before."""
         run = self._training.run
-        if run is None or not run.facts.has_model:
+        if run is None or not run.has_model:
             return
         try:
             kept = self._keep(run.folder.path.name, run.folder.best)

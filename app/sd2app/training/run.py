@@ -143,33 +143,28 @@ class TrainingHistory(StepHistory):
         self.paused = False
 
 
-class TrainingFacts(NamedTuple):
-    """Facts about the files of a run."""
-
-    config: TrainConfig | None = None  # its settings; None until they can be read
-    has_model: bool = False  # there is one to use
-    has_checkpoint: bool = False
-
-
 class TrainingMonitor(RunMonitor[TrainingFolder]):
     """A training run with its settings and its history of epochs."""
 
     folders, histories = TrainingFolder, TrainingHistory
     history: TrainingHistory
-    facts = TrainingFacts()
+    config: TrainConfig | None = None  # its settings; None until they can be read
 
-    def inspect(self) -> TrainingFacts:
-        """Read the settings, and look which models are there."""
-        folder, config = self.folder, self.facts.config
-        if config is None and folder.exists:
+    def inspect(self) -> None:
+        """Read the settings."""
+        if self.config is None and self.folder.exists:
             with suppress(Sd2Error):  # not written yet
-                config = read_config(folder.config)
-        return TrainingFacts(config, folder.best.exists(), folder.last.exists())
+                self.config = read_config(self.folder.config)
+
+    @property
+    def has_model(self) -> bool:
+        """True if there is one to use."""
+        return self.folder.best.exists()
 
     @property
     def resumable(self) -> bool:
         """True if it can be resumed."""
-        return self.facts.has_checkpoint and self.phase in ("stopped", "failed", "died")
+        return self.phase in ("stopped", "failed", "died") and self.folder.last.exists()
 
 
 def _count(value: Any, least: int = 0) -> int:
@@ -264,9 +259,9 @@ def remedy_text(run: TrainingMonitor) -> str:
         if run.resumable:
             return f"{text} Resume goes on from the last checkpoint, with the same result."
         return f"{text} It had not come to its first checkpoint: start it again."
-    if run.phase == "failed" and run.facts.has_model:
+    if run.phase == "failed" and run.has_model:
         return "The best model up to then is kept."
-    if run.phase == "stopped" and run.facts.has_model:
+    if run.phase == "stopped" and run.has_model:
         return "The best model is kept. Resume goes on where it ended."
     return ""
 
@@ -286,7 +281,7 @@ def metric_rows(history: TrainingHistory) -> list[tuple[str, str]]:
 
 def about_text(run: TrainingMonitor) -> str:
     """Model and data of a run."""
-    history, config = run.history, run.facts.config
+    history, config = run.history, run.config
     parts = [model_name(history.model)] if history.model else []
     if history.parameters:
         parts.append(f"{history.parameters:,} parameters")

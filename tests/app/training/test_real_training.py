@@ -50,7 +50,7 @@ def test_it_trains_a_model(model, qtbot) -> None:
     assert history.epoch_points[-1].train_rmse < history.epoch_points[0].train_rmse
     card = describe_model(model.run.folder.best)
     assert (card.model, card.trained_on, card.axis.bins) == ("gru", "simulated", 32)
-    assert model.run.facts.config == model.setup.config
+    assert model.run.config == model.setup.config
 
 
 def test_killed_it_goes_on_and_cancelled_it_leaves_nothing(model, qtbot) -> None:
@@ -65,7 +65,7 @@ def test_killed_it_goes_on_and_cancelled_it_leaves_nothing(model, qtbot) -> None
     wait_for(qtbot, model, "stopped")
     done = len(model.run.history.epoch_points)
     assert done >= 1
-    assert model.run.facts.has_model
+    assert model.run.has_model
     model.resume()
     wait_for(qtbot, model, "running")
     qtbot.waitUntil(lambda: len(model.run.history.epoch_points) > done, timeout=PATIENCE_MS)

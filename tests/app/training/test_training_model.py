@@ -83,7 +83,7 @@ def test_a_run_from_start_to_end(made, qtbot) -> None:
     assert run.history.best.validation_rmse == pytest.approx(0.4)
     assert run.history.share == 1.0
     assert run.folder.best.exists()
-    assert run.facts.config.data.pairs == (model.setup.data[0].path,)
+    assert run.config.data.pairs == (model.setup.data[0].path,)
     assert not list(run.folder.path.parent.glob(".*"))
 
 

@@ -12,7 +12,6 @@ from sd2app.session.maps import MapModel
 from sd2app.session.session import Maps
 from sd2app.training import result as training_use
 from sd2app.training.result import ModelAdoption, gain_rows, gain_summary
-from sd2app.training.run import TrainingFacts
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -27,7 +26,7 @@ class FakeFolder:
 
 
 class FakeRun:
-    facts = TrainingFacts(has_model=True)
+    has_model = True
 
     def __init__(self, path: Path) -> None:
         self.folder = FakeFolder(path)
