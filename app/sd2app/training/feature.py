@@ -141,9 +141,8 @@ class TrainingSetupView(TrainingForm):
             else f"Goes on from {model_title(card)}, with its kind and its input."
         )
         self._reset.setVisible(setup.differs)
-        estimate = setup.estimate
-        count = f"{estimate.segments:,} segments, {counted(estimate.steps, 'step')}"
-        self.show_estimate(count, estimate.steps, estimate.step_s)
+        count = f"{setup.segments:,} segments, {counted(setup.steps, 'step')}"
+        self.show_estimate(count, setup.steps, setup.step_s)
         self.show_start(training.why_not_start, can_copy=not setup.problem)
 
     def _fill_menu(self) -> None:

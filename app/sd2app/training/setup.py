@@ -67,15 +67,6 @@ class Store(Source):
         return " · ".join(parts)
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """Size of a run, and its time as far as this machine has measured such steps."""
-
-    segments: int  # training segments per epoch
-    steps: int
-    step_s: float | None  # None until a run of the kind has measured it
-
-
 class TrainingSetupModel(RunSetup[Store]):
     """Pairs and settings for a denoiser."""
 
@@ -138,7 +129,7 @@ class TrainingSetupModel(RunSetup[Store]):
             )
         if self.parts and not all(one.has_limbs for one in facts):
             return "Some of these pairs are not split by the parts of the body. Learn from the map."
-        if not self._segments():
+        if not self.segments:
             return "Every take is shorter than one segment of 72 frames."
         return ""
 
@@ -178,11 +169,14 @@ class TrainingSetupModel(RunSetup[Store]):
         )
 
     @property
-    def estimate(self) -> Estimate:
-        """Size and time of the run."""
-        segments = self._segments()
-        steps = -(-segments // self._values["batch_size"]) * self._values["epochs"]
-        return Estimate(segments, steps, known_pace_s(self._config(_DATA.pairs).pace_kind))
+    def steps(self) -> int:
+        """Number of training steps."""
+        return -(-self.segments // self._values["batch_size"]) * self._values["epochs"]
+
+    @property
+    def step_s(self) -> float | None:
+        """Seconds per step, as this machine has measured such steps; None where it has not."""
+        return known_pace_s(self._config(_DATA.pairs).pace_kind)
 
     @property
     def division(self) -> Split | None:
@@ -199,8 +193,9 @@ class TrainingSetupModel(RunSetup[Store]):
             for subject, name in names.items()
         ]
 
-    def _segments(self) -> int:
-        """Number of training segments."""
+    @property
+    def segments(self) -> int:
+        """Number of training segments per epoch."""
         division = self.division
         if division is None:
             return 0

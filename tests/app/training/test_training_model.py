@@ -288,7 +288,7 @@ def test_stores_are_learnt_from_as_the_library_does(
     config = model.setup.config
     data = prepare(read_mixed(config.data.pairs), config.data)
     assert model.setup.division == data.split
-    assert model.setup.estimate.segments == len(data.training)
+    assert model.setup.segments == len(data.training)
     write_pairs(tmp_path / "other.zarr", subjects=3, bins=16)
     model.setup.add(tmp_path / "other.zarr")
     qtbot.waitUntil(lambda: "differ in their velocity axis" in model.setup.problem)
@@ -310,7 +310,7 @@ def test_one_person_is_divided_by_takes_and_that_is_said(made, qtbot, tmp_path) 
     assert "stays unknown" in division_text(model.setup.division)
     config = model.setup.config
     learnt = prepare(read_mixed(config.data.pairs), config.data).training
-    assert model.setup.estimate.segments == len(learnt)
+    assert model.setup.segments == len(learnt)
 
 
 def test_the_command_is_one_that_sd2_takes(made) -> None:
@@ -335,15 +335,15 @@ def test_the_command_is_one_that_sd2_takes(made) -> None:
 
 def test_the_time_is_known_once_a_run_has_measured_its_steps(made) -> None:
     model = made()
-    estimate = model.setup.estimate
-    assert (estimate.segments, estimate.steps, estimate.step_s) == (20, 3, None)
+    setup = model.setup
+    assert (setup.segments, setup.steps, setup.step_s) == (20, 3, None)
     keep_pace(model.setup.config.pace_kind, 10.0, 40)
-    assert model.setup.estimate.step_s == 0.25
+    assert model.setup.step_s == 0.25
     model.setup.set_value("epochs", 9)
-    assert (model.setup.estimate.steps, model.setup.estimate.step_s) == (9, 0.25)
+    assert (model.setup.steps, model.setup.step_s) == (9, 0.25)
     # Other steps are another matter.
     model.setup.set_value("batch_size", 8)
-    assert (model.setup.estimate.steps, model.setup.estimate.step_s) == (27, None)
+    assert (model.setup.steps, model.setup.step_s) == (27, None)
 
 
 def test_a_process_outlives_who_started_it_and_is_seen_to_end(qtbot, tmp_path) -> None:

@@ -195,7 +195,7 @@ def test_what_is_set_up_is_what_is_started(made, qtbot, pairs) -> None:
     qtbot.waitUntil(lambda: "6 people" in texts(window))
     assert "Learns from 4 people; the best model is chosen by s4; s5 kept for" in texts(window)
     # 300 frames are 5 segments, and four people learn from: 20 in one step of 64.
-    assert setup.estimate.segments == 20
+    assert setup.segments == 20
     assert "Time: not known yet" in texts(window)
     assert "20 segments, 500 steps. The first ones tell how long it takes." in texts(window)
     keep_pace(setup.config.pace_kind, 10.0, 40)
