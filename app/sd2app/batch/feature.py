@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
-from sd2app.batch.run import BatchMonitor, batch_time_text, failure_text, headline, step_facts
+from sd2app.batch.run import BatchMonitor, batch_time_text, headline, step_facts
 from sd2app.batch.setup_view import BatchSetupView
 from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Action, Feature, Shell, report
@@ -107,10 +107,10 @@ class BatchRunView(RunView[BatchMonitor]):
         self._buttons["resume"].setText("Run again" if run.phase == "finished" else "Go on")
         self._buttons["folder"].setEnabled(run.path.is_dir())
         self._show_steps(run)
-        _show(self._failures, "\n\n".join(map(failure_text, failures)) or "None.")
+        _show(self._failures, "\n\n".join(failures) or "None.")
         count = len(failures)
         self._inner.name_page(_FAILURES_PAGE, f"{_FAILURES} ({count})" if count else _FAILURES)
-        _show(self._log, run.facts.log or "Nothing was noted.")
+        _show(self._log, run.facts or "Nothing was noted.")
         if results.card != self._shown_card:
             self._shown_card = results.card
             self._card.setMarkdown(results.card or _NO_DATASET)

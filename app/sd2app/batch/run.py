@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked
@@ -33,21 +32,6 @@ _KEPT_FAILURES = 500
 """Limit of kept failures; the report has all."""
 
 
-@dataclass(frozen=True)
-class Failed:
-    """A task that cannot be done."""
-
-    recording: str
-    step: str
-    placement: int | None
-    reason: str
-
-
-class _Facts(NamedTuple):
-    log: str  # its end
-    has_plan: bool
-
-
 def plan_of(folder: Path) -> Path:
     """Plan that a batch is started with; it keeps a copy in its folder."""
     return folder.with_name(f".{folder.name}.plan.toml")
@@ -61,7 +45,7 @@ class BatchHistory(History):
 
     def __init__(self) -> None:
         self.tasks: dict[str, dict[str, int]] = {}  # per step: "total", "done", "there" already
-        self.failures: list[Failed] = []
+        self.failures: list[str] = []  # tasks that cannot be done, each with its reason
 
     @property
     def share(self) -> float | None:
@@ -87,15 +71,10 @@ class BatchHistory(History):
 
     def _take_failed(self, event: Event) -> None:
         if len(self.failures) < _KEPT_FAILURES:
-            placement = event.get("placement")
-            self.failures.append(
-                Failed(
-                    str(event.get("recording", "")),
-                    str(event.get("step", "")),
-                    placement if isinstance(placement, int) else None,
-                    reason_in(event),
-                )
-            )
+            place = f" from place {event['placement']}" if event.get("placement") else ""
+            step = str(event["step"])
+            what = f"{event['recording']}, {STEP_WORDS.get(step, step).lower()}{place}"
+            self.failures.append(f"{what}: {reason_in(event)}")
 
 
 class BatchMonitor(RunMonitor[BatchFolder]):
@@ -103,16 +82,16 @@ class BatchMonitor(RunMonitor[BatchFolder]):
 
     folders, histories = BatchFolder, BatchHistory
     history: BatchHistory
-    facts = _Facts("", False)
+    facts = ""  # end of its log
 
-    def inspect(self) -> _Facts:
-        """Read the end of the log, and look for a plan to go on with."""
-        return _Facts(last_output(self.folder.log), self.folder.plan.exists())
+    def inspect(self) -> str:
+        """Read the end of the log."""
+        return last_output(self.folder.log)
 
     @property
     def resumable(self) -> bool:
         """True if the same command would go on with it."""
-        return not self.under_way and self.phase != "gone" and self.facts.has_plan
+        return not self.under_way and self.phase != "gone" and self.folder.plan.exists()
 
 
 STEP_WORDS = {
@@ -165,13 +144,6 @@ def step_facts(batch: BatchMonitor) -> list[tuple[str, int, int, str]]:
             words += f", {there:,} there already"
         facts.append((STEP_WORDS.get(step, step), done + there, total, words))
     return facts
-
-
-def failure_text(failed: Failed) -> str:
-    """One failure, on a line."""
-    place = f" from place {failed.placement}" if failed.placement else ""
-    step = STEP_WORDS.get(failed.step, failed.step).lower()
-    return f"{failed.recording}, {step}{place}: {failed.reason}"
 
 
 def estimate_headline(made: BatchEstimate) -> str:
