@@ -24,7 +24,6 @@ from sd2core.files.paths import user_data
 from sd2core.imu.mounting import PLACES
 from sd2core.maps import MapKind
 from sd2core.options.records import words_of
-from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 from sd2core.runs.pace import Kind, known_pace_s
@@ -228,14 +227,10 @@ class ExportModel(Runs[ExportRun]):
         if run is None:
             self.look_for_runs()
         else:
-            self._job = Job(f"Exporting {run.out.name}", partial(self.tell, "stop"))
-            self._jobs.start(self._job)
-            run.changed.connect(self._report)
-
-    def _report(self) -> None:
-        if self.run is not None and self._job is not None:
-            history = self.run.history
-            self._jobs.report(self._job, history.done, history.total)
+            told = run.history
+            job = self._job = Job(f"Exporting {run.out.name}", partial(self.tell, "stop"))
+            self._jobs.start(job)
+            run.changed.connect(lambda: self._jobs.report(job, told.done, told.total))
 
     def say_ended(self, run: ExportRun) -> None:
         """Tell the user what is written and what was left out, or what went wrong."""
@@ -314,8 +309,6 @@ class ExportModel(Runs[ExportRun]):
         self.changed.emit()
 
     def _refuse(self, error: Exception) -> None:
-        if isinstance(error, Cancelled):
-            return
         self._counted = None
         self.problem = str(error)
         self.changed.emit()
