@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
+import struct
 import zlib
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import (
@@ -65,24 +67,39 @@ def member_of(file: Any, path: Path, name: str) -> Any:
 def text_of(array: Any, path: Path, name: str) -> str:
     """Text of a dataset that holds one, of fixed or of variable length; Sd2Error if it cannot be.
 
-    The HDF5 library takes as much memory as the length says that stands in a file: so that is read
-    here first (HDF5 File Format Specification 3.0, section IV.B, variable-length data).
+    One of variable length is read here: the HDF5 library takes as much memory as the length says
+    that stands in a file, and does not come back from some damaged heaps.
     """
     place, expected = f"{name} of {path}", "a text of HDF5's default layout"
-    if array.dtype.kind != "S":
+    with reading_as("a text", place, expected, "Copy or download it again"):
+        if array.dtype.kind == "S":
+            return str(array[()].decode("utf-8", "replace"))
         start, plan = array.id.get_offset(), array.file.id.get_create_plist()
         if start is None or plan.get_userblock():
             raise Sd2Error(f"{place} is stored in an unusual way", expected)
         with open_regular(path) as stream:
-            stream.seek(start)
-            length = int.from_bytes(stream.read(4), "little")
-        if length * _TEXT_PART > read_limit_bytes():
-            raise Sd2Error(f"{place} has {length:,} bytes, in a damaged heap", expected)
-    try:
-        return str(array[()].decode("utf-8", "replace"))
-    except OSError as error:
-        found = f"{place} is not in its heap ({error})"
-        raise Sd2Error(found, expected, "Copy or download it again") from error
+            return _heap_object(stream, start).decode("utf-8", "replace")
+
+
+def _heap_object(stream: BinaryIO, start: int) -> bytes:
+    """Bytes of variable length; ValueError or struct.error if they are not in their heap.
+
+    HDF5 File Format Specification 3.0, sections III.E (global heap) and IV.B (variable length).
+    """
+    stream.seek(start)
+    length, address, wanted = struct.unpack("<IQI", stream.read(16))
+    if not length:
+        return b""
+    stream.seek(address)
+    signature, size = struct.unpack("<4s4xQ", stream.read(16))
+    if signature != b"GCOL" or max(length, size) * _TEXT_PART > read_limit_bytes():
+        raise ValueError(f"{length:,} bytes, in a damaged heap of {size:,}")
+    while stream.tell() < address + size:
+        number, content_bytes = struct.unpack("<H6xQ", stream.read(16))
+        if number == wanted:
+            return stream.read(min(length, content_bytes))
+        stream.seek(content_bytes + -content_bytes % 8, os.SEEK_CUR)
+    raise ValueError(f"it is not in its heap of {size:,} bytes")
 
 
 def _check_array(array: Any, path: Path, name: str) -> None:

@@ -35,7 +35,7 @@ def test_texts_come_back_as_they_were_written(
         assert text_of(member_of(file, path, "fixed"), path, "fixed") == "of eight"
 
 
-@pytest.mark.parametrize("damage", ["length", "address", "number", "size"])
+@pytest.mark.parametrize("damage", ["length", "address", "number", "size", "endless"])
 def test_a_damaged_heap_is_refused(tmp_path: Path, damage: str) -> None:
     path = tmp_path / "damaged.h5"
     with h5py.File(path, "w") as file:
@@ -47,9 +47,13 @@ def test_a_damaged_heap_is_refused(tmp_path: Path, damage: str) -> None:
         "address": (start + 4, 8),
         "number": (start + 12, 4),
         "size": (address + 8, 8),
+        "endless": (address + 24, 8),  # of the first text: the library goes round there for ever
     }[damage]
     content = bytearray(path.read_bytes())
     content[place : place + length] = b"\x7f" * length
+    if damage == "endless":
+        content[place : place + length] = (2**64 - 16).to_bytes(8, "little")
+        content[start + 12 : start + 16] = b"\x02\0\0\0"
     path.write_bytes(content)
     with h5py.File(path, "r") as file, pytest.raises(Sd2Error, match=r"text of .*damaged\.h5"):
         text_of(member_of(file, path, "text"), path, "text")
