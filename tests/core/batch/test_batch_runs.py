@@ -103,7 +103,6 @@ def test_a_tolerance_is_one_plan_per_mesh_for_all_its_places(
     run: Runs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sd2core.accuracy.places._MIN_FRAMES", 1)
-    monkeypatch.setattr("sd2core.accuracy.places.PlanSearch.reference_s", lambda _: 0.0)
     paths = save_spheres(run.folder / "meshes", 2)
     end = run(MAPS + "tolerance = 0.1\n")
     assert (end.outcome, end.failed) == ("finished", 0)
