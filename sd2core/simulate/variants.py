@@ -17,6 +17,7 @@ from sd2core.body.reshaping import coarser, reshaped
 from sd2core.body.shape import ShapeSpace
 from sd2core.denoise.resample_to_model import evenly
 from sd2core.doppler import SynthesisOptions, Synthesizer
+from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import FRAMES_PER_S, MarsStretch, mars_parts, read_mars
 from sd2core.labels.per_frame import BACKGROUND
 from sd2core.maps import OF, DopplerMap
@@ -105,14 +106,19 @@ def vary_recordings(
     Raises
     ------
     Sd2Error
-        If a recording has no mesh, two are called alike, there is not one person for each, frame
-        rates differ, or (shapes) a mesh has another surface than the bundled body.
+        If a recording has no mesh, none shows anybody for a second, two are called alike, there is
+        not one person for each, frame rates differ, or (shapes) a mesh has another surface than the
+        bundled body.
     """
     named = named_recordings(recordings, subjects)
     check_there([recording for recording, _ in named], ("mesh",))
     meshes = [recording.load_mesh() for recording, _ in named]
     rates_hz = [mesh.timebase.frames_per_s for mesh in meshes]
     check_rates({one.folder: rate for (one, _), rate in zip(named, rates_hz, strict=True)})
+    if not any(map(_stretches, meshes)):
+        raise Sd2Error(
+            "No recording shows anybody for a second on end", "a mesh that moves for a second"
+        )
     _, *labels = label_names(recording for recording, _ in named)
     sources: dict[str, Any] = {"sources": [one.folder.name for one, _ in named]}
     sources |= scenes_of(recording for recording, _ in named)
@@ -135,15 +141,19 @@ def _of_recording(
     recording: Recording, names: tuple[str, ...], subject: str, mesh: MeshSequence
 ) -> Iterator[_Movement]:
     labels, own = [*names, ""], recording.effective_labels()  # the last is that of UNKNOWN
-    seen, rate_hz = mesh.presence.present, mesh.timebase.frames_per_s
-    stretches = take_frames(mesh.times_s, seen, rate_hz)
-    for number, (start, stop) in enumerate(stretches):
+    for number, (start, stop) in enumerate(_stretches(mesh)):
         yield _Movement(
             TakeKey(subject, f"{recording.folder.stem}-{number:03d}", 0),
             mesh.between(start, stop),
             recording.sensor.position_m,
             [labels[one] for one in frame_labels(own, names, mesh.times_s[start:stop])],
         )
+
+
+def _stretches(mesh: MeshSequence) -> list[tuple[int, int]]:
+    """Frames of the takes of a mesh."""
+    seen, rate_hz = mesh.presence.present, mesh.timebase.frames_per_s
+    return [*take_frames(mesh.times_s, seen, rate_hz)]
 
 
 def vary_mars(

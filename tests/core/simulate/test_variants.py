@@ -92,6 +92,13 @@ def test_simulated_pairs_of_a_scene_have_the_labels_of_recorded_ones(tmp_path: P
     assert made.provenance["scenes"] == recorded.provenance["scenes"]
 
 
+def test_nobody_who_moves_is_refused_before_there_is_a_store(tmp_path: Path) -> None:
+    one = swaying(tmp_path / "anna.sd2", frames=20)
+    with pytest.raises(Sd2Error, match="No recording shows anybody for a second on end"):
+        vary(one, tmp_path / "made.zarr", "places")
+    assert not (tmp_path / "made.zarr").exists()
+
+
 def test_pairs_of_a_scene_are_split_by_everybodys_limbs(tmp_path: Path) -> None:
     one = swaying(tmp_path / "duo.sd2", frames=35)
     one.subject, one.bodies = "Anna", (Placed(str(one.mesh), (1.0, 0.0, 0.5), person="Bert"),)
