@@ -146,26 +146,12 @@ def fit_wiener(
     inputs: Sequence[NDArray[np.float32]],
     targets: Sequence[NDArray[np.float32]],
     null_bins: Sequence[int] = (),
-    *,
-    frames: int = 9,
-    width: int = 5,
 ) -> WienerDenoiser:
-    """Fit a Wiener filter in closed form.
-
-    Parameters
-    ----------
-    inputs, targets : sequence of float32 ndarray, (frames, bins)
-        Compressed maps, one of each per take.
-    null_bins : sequence of int
-        Bins that do not count.
-    frames, width : int
-        Cells that the filter spans: the last frames, and bins around the own one. The width is
-        odd.
-    """
+    """Fit a Wiener filter in closed form; what is given is as for :func:`fit_median`."""
     bins = inputs[0].shape[1]
     counted = _counted(bins, null_bins)
-    wiener = WienerDenoiser(bins, frames=frames, width=width)
-    taps, rows = frames * width, sum(map(len, inputs))
+    wiener = WienerDenoiser(bins)
+    taps, rows = len(wiener.weight), sum(map(len, inputs))
     first_x, first_y = np.zeros((len(counted), taps)), np.zeros(len(counted))
     gram, cross = np.zeros((taps, taps)), np.zeros(taps)
     for one, target in zip(inputs, targets, strict=True):
@@ -193,25 +179,15 @@ def fit_ridge(
     inputs: Sequence[NDArray[np.float32]],
     targets: Sequence[NDArray[np.float32]],
     null_bins: Sequence[int] = (),
-    *,
-    frames: int = 9,
 ) -> RidgeDenoiser:
     """Fit a ridge regression (A. E. Hoerl and R. W. Kennard, 1970) in closed form.
 
     The ridge is the one of :data:`_RIDGES` that does best on every fifth take, fitted to the
-    others; of fewer than five takes it is the largest.
-
-    Parameters
-    ----------
-    inputs, targets : sequence of float32 ndarray, (frames, bins)
-        Compressed maps, one of each per take.
-    null_bins : sequence of int
-        Bins that do not count; their answer is 0.
-    frames : int
-        Last frames that an answer is made of.
+    others; of fewer than five takes it is the largest. What is given is as for :func:`fit_median`;
+    the answer is 0 in bins that do not count.
     """
     bins = inputs[0].shape[1]
-    ridge = RidgeDenoiser(bins, frames=frames)
+    ridge = RidgeDenoiser(bins)
     counted = _counted(bins, null_bins)
     sums = [
         _Sums.of(ridge, one, target[:, counted])

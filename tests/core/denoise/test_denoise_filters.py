@@ -26,10 +26,10 @@ def filtered(values: np.ndarray) -> np.ndarray:
 
 def test_wiener_recovers_a_linear_filter() -> None:
     inputs = takes(3)
-    wiener = fit_wiener(inputs, [filtered(one) for one in inputs], NULLED, frames=4, width=3)
-    expected = np.zeros((4, 3))
-    expected[2, 1], expected[3, 2] = 0.5, 0.25
-    np.testing.assert_allclose(wiener.weight.view(4, 3), expected, atol=1e-4)
+    wiener = fit_wiener(inputs, [filtered(one) for one in inputs], NULLED)
+    expected = np.zeros((9, 5))
+    expected[7, 2], expected[8, 3] = 0.5, 0.25
+    np.testing.assert_allclose(wiener.weight.view(9, 5), expected, atol=1e-4)
     counted = np.delete(np.arange(32), NULLED)
     np.testing.assert_allclose(wiener.mean[counted], np.linspace(1, 0, 32)[counted], atol=1e-3)
     unseen = np.sqrt(energies(50, 99))
@@ -42,10 +42,10 @@ def test_wiener_shrinks_towards_the_mean_as_the_closed_form_says() -> None:
     random = np.random.default_rng(0)
     clean = random.normal(size=(20_000, 32)).astype(np.float32)
     noisy = clean + 2.0 * random.normal(size=clean.shape).astype(np.float32)
-    wiener = fit_wiener([noisy], [clean], frames=3, width=3)
-    expected = np.zeros((3, 3))
-    expected[2, 1] = 1 / (1 + 2.0**2)
-    np.testing.assert_allclose(wiener.weight.view(3, 3), expected, atol=0.01)
+    wiener = fit_wiener([noisy], [clean])
+    expected = np.zeros((9, 5))
+    expected[8, 2] = 1 / (1 + 2.0**2)
+    np.testing.assert_allclose(wiener.weight.view(9, 5), expected, atol=0.01)
 
 
 def test_wiener_without_fit_changes_nothing() -> None:
@@ -58,10 +58,10 @@ def test_ridge_recovers_a_linear_map_of_all_bins() -> None:
     across = random.normal(size=(32, 32)) / 32
     inputs = takes(10)
     goals = [(filtered(one) @ across).astype(np.float32) for one in inputs]
-    ridge = fit_ridge(inputs[:9], goals[:9], NULLED, frames=2)
+    ridge = fit_ridge(inputs[:9], goals[:9], NULLED)
     counted = np.delete(np.arange(32), NULLED)
     answer = ridge(torch.from_numpy(inputs[9])[None])[0].numpy()
-    np.testing.assert_allclose(answer[1:, counted], goals[9][1:, counted], atol=2e-3)
+    np.testing.assert_allclose(answer[8:, counted], goals[9][8:, counted], atol=2e-3)
     assert not answer[:, NULLED].any()
 
 
