@@ -115,10 +115,6 @@ class S4Classifier(S4Stack, Classifier):
         )
 
 
-_LARGEST = 1024
-"""No option is a larger number: a damaged file must not ask for all the memory."""
-
-
 def options(name: str) -> dict[str, Any]:
     """Return the options of a model with their defaults."""
     return dict((ENTRIES[name] if name in ENTRIES else _plug_in(name).load()).options)
@@ -131,7 +127,7 @@ def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
     """
     known = options(name)
     for option, value in given.items():
-        check_option(f"classifier {name}", option, value, known, _LARGEST)
+        check_option(f"classifier {name}", option, value, known)
 
     def built(entry: Architecture) -> Classifier:
         return entry.made(size, classes, **entry.fixed, **{**known, **given})

@@ -173,7 +173,7 @@ def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any
         raise Sd2Error(f"A model of maps of {bins} bins", f"from 1 to {_MAX_BINS:,} bins")
     known = options(name)
     for option, value in given.items():
-        check_option(f"model {name}", option, value, known, _LARGEST)
+        check_option(f"model {name}", option, value, known)
     from sd2core.denoise.model import Denoiser
 
     if name in _ENTRIES:
@@ -259,7 +259,7 @@ def _plug_in(name: str) -> PlugIn[Architecture]:
     return plug_in
 
 
-def check_option(what: str, option: str, value: Any, known: Mapping[str, Any], most: int) -> None:
+def check_option(what: str, option: str, value: Any, known: Mapping[str, Any]) -> None:
     """Raise Sd2Error for an option of a network that is unknown or not of its default's kind.
 
     Parameters
@@ -273,8 +273,6 @@ def check_option(what: str, option: str, value: Any, known: Mapping[str, Any], m
     known : mapping
         Defaults of all options. Steps (``dt_min``, ``dt_max``) are 1e-6 to 10, other numbers that
         are not whole shares from 0 to below 1.
-    most : int
-        Largest whole number; the smallest is 1.
     """
     if option not in known:
         raise Sd2Error(
@@ -286,8 +284,8 @@ def check_option(what: str, option: str, value: Any, known: Mapping[str, Any], m
         if not isinstance(value, bool):
             raise Sd2Error(message, "true or false")
     elif isinstance(known[option], int):
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-            raise Sd2Error(message, f"a whole number, 1 to {most}")
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= _LARGEST:
+            raise Sd2Error(message, f"a whole number, 1 to {_LARGEST}")
     elif isinstance(value, bool) or not isinstance(value, int | float):
         raise Sd2Error(message, "a number")
     elif option in ("dt_min", "dt_max"):
