@@ -77,7 +77,7 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     from PySide6.QtWidgets import QApplication
 
     from sd2app.training.feature import TrainingRunView
-    from sd2app.training.run import EpochPoint, StepPoint
+    from sd2app.training.run import EpochPoint
     from sd2app.widgets.chart import ChartView
 
     window, training = sample_window, models_of(sample_window).training
@@ -92,9 +92,7 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
         EpochPoint(epoch, 0.1 + 1 / epoch, 0.12 + 1 / epoch + 0.01 * rng.random(), 0.1, True)
         for epoch in range(1, 501)
     ]
-    history.step_points = [
-        StepPoint(at, 0.1 + rng.random() / at) for at in np.linspace(0.25, 500, 2000)
-    ]
+    history.step_points = [(at, 0.1 + rng.random() / at) for at in np.linspace(0.25, 500, 2000)]
     curves = window.findChild(TrainingRunView).findChild(ChartView)
 
     def update() -> float:

@@ -192,7 +192,7 @@ def recall_text(check: CheckPoint) -> str:
 def class_chart(history: ClassHistory) -> Chart:
     """Recall in per cent and, faint, the loss as a share of the first one, over the steps."""
     losses, checks = history.losses, history.checks
-    first = max(losses[0].loss, 1e-9) if losses else 1.0
+    first = max(losses[0][1], 1e-9) if losses else 1.0
     marks = [Mark(one.step, 100 * one.recall, _check_text(one)) for one in checks]
     best = next(
         (mark for mark, one in zip(marks, checks, strict=True) if one is history.best), None
@@ -206,7 +206,7 @@ def class_chart(history: ClassHistory) -> Chart:
             Curve(
                 "loss",
                 "synthetic",
-                [(one.step, 100 * min(one.loss / first, 1.0)) for one in losses],
+                [(step, 100 * min(loss / first, 1.0)) for step, loss in losses],
                 width_px=1,
                 alpha=110,
             ),

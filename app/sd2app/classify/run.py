@@ -270,13 +270,6 @@ def _what(facts: Sequence[LabelledFacts]) -> str:
 MODEL_NAME = "classifier.safetensors"
 
 
-class LossPoint(NamedTuple):
-    """Cross entropy of a batch."""
-
-    step: int
-    loss: float
-
-
 class CheckPoint(NamedTuple):
     """Mean recall over classes, on the people held out to select the best model."""
 
@@ -290,7 +283,7 @@ class ClassHistory(StepHistory):
 
     def __init__(self) -> None:
         super().__init__()
-        self.losses: list[LossPoint] = []
+        self.losses: list[tuple[int, float]] = []  # steps, and cross entropy of their batches
         self.checks: list[CheckPoint] = []
 
     @property
@@ -305,7 +298,7 @@ class ClassHistory(StepHistory):
         step, loss = int(event["step"]), float(event["loss"])
         self._advance(step, float(event["elapsed_s"]))
         if math.isfinite(loss):
-            self.losses.append(LossPoint(step, loss))
+            self.losses.append((step, loss))
 
     def _take_check(self, event: dict[str, Any]) -> None:
         step, recall = int(event["step"]), float(event["validation_mean_recall"])

@@ -265,7 +265,7 @@ def training_chart(history: TrainingHistory) -> Chart:
     trained = [(one.epoch, one.train_rmse) for one in epochs]
     validated = [(one.epoch, one.validation_rmse) for one in epochs]
     curves = [
-        Curve("", "synthetic", _drawable(history.step_points), width_px=1, alpha=80),
+        Curve("", "synthetic", history.step_points, width_px=1, alpha=80),
         Curve("training", "synthetic", _drawable(trained)),
         Curve("validation", "real", _drawable(validated)),
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from sd2app.background.run_monitor import History, RunMonitor, reason_in
 from sd2app.widgets.run_text import AT_WORK, PHASES
@@ -39,13 +39,6 @@ class StepHistory(History):
             self._pace.take(steps, elapsed_s)
 
 
-class StepPoint(NamedTuple):
-    """Error on the batches up to a step."""
-
-    at: float  # in epochs: 1.5 is the middle of the second
-    train_rmse: float
-
-
 @dataclass(frozen=True)
 class EpochPoint:
     """Errors after an epoch; NaN if not reported."""
@@ -69,7 +62,8 @@ class TrainingHistory(StepHistory):
 
     def __init__(self) -> None:
         super().__init__()
-        self.step_points: list[StepPoint] = []
+        # Place in epochs, 1.5 in the middle of the second, and error on the batches up to there.
+        self.step_points: list[tuple[float, float]] = []
         self.epoch_points: list[EpochPoint] = []
 
     @property
@@ -97,7 +91,7 @@ class TrainingHistory(StepHistory):
         # What was done after the checkpoint is done again.
         self.done = done if event.get("resumed") else 0
         at = self.done / self.steps_per_epoch if self.steps_per_epoch else 0.0
-        self.step_points = [point for point in self.step_points if point.at <= at]
+        self.step_points = [point for point in self.step_points if point[0] <= at]
         self.epoch_points = [point for point in self.epoch_points if point.epoch <= at]
         self.epoch = math.ceil(at)
         self.left_s = None
@@ -109,7 +103,7 @@ class TrainingHistory(StepHistory):
         step, rmse = _count(event["step"]), _number(event.get("train_rmse"))
         self._go_to(_count(event["epoch"], 1), step, event)
         if math.isfinite(rmse) and rmse > 0:
-            self.step_points.append(StepPoint(step / max(self.steps_per_epoch, 1), rmse))
+            self.step_points.append((step / max(self.steps_per_epoch, 1), rmse))
 
     def _go_to(self, epoch: int, steps: int, event: dict[str, Any]) -> None:
         elapsed_s, left_s = _number(event.get("elapsed_s")), _number(event.get("left_s"))

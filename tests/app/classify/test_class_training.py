@@ -246,7 +246,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
     run = model.run
     assert run.phase == "finished"
     assert run_headline(run) == "Finished"
-    assert [point.step for point in run.history.losses] == list(range(1, 7))
+    assert [step for step, _ in run.history.losses] == list(range(1, 7))
     assert [(one.recall, one.best) for one in run.history.checks] == [
         (0.5, True), (0.8, True), (0.7, False),
     ]  # fmt: skip

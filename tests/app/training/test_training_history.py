@@ -38,7 +38,7 @@ def test_what_is_told_stands_in_it() -> None:
     assert (history.model, history.parameters, history.segments) == ("s4", 7, 300)
     assert (history.epoch, history.done, history.share) == (2, 10, 0.5)
     assert history.best.epoch == 1
-    assert [point.at for point in history.step_points] == [0.2, 1.0, 1.2]
+    assert [at for at, _ in history.step_points] == [0.2, 1.0, 1.2]
     assert metric_rows(history)[0] == ("Best epoch", "1")
     assert (history.simulated, told(START | {"kind": "simulated"}).simulated) == (False, True)
 
