@@ -226,21 +226,9 @@ class Portrait:
     """Somebody in a video."""
 
     number: int
-    from_s: float
-    to_s: float
-    certainty: float  # that all looks show one person, from 0 to 1
-    may_be: int | None  # somebody seen before
+    words: str  # when they are there and how sure that is
     frame: int  # of the picture
     picture: NDArray[np.uint8]  # (PICTURE_PX, PICTURE_PX, 3), RGB
-
-    @property
-    def words(self) -> str:
-        """When they are there and how sure that is."""
-        again = f"\nmay be person {self.may_be}" if self.may_be else ""
-        return (
-            f"Person {self.number}\n{self.from_s:.1f} to {self.to_s:.1f} s"
-            f"\n{100.0 * self.certainty:.0f} % certain{again}"
-        )
 
 
 def portraits_of(path: Path, emit: Emit) -> list[Portrait]:
@@ -258,6 +246,9 @@ def portraits_of(path: Path, emit: Emit) -> list[Portrait]:
         portraits = []
         for each in people:
             frame, roi = each.portrait
-            facts = (each.number, each.from_s, each.to_s, each.certainty, each.may_be, frame)
-            portraits.append(Portrait(*facts, roi.cut(video.read(frame), PICTURE_PX)))
+            words = f"Person {each.number}\n{each.from_s:.1f} to {each.to_s:.1f} s"
+            words += f"\n{100.0 * each.certainty:.0f} % certain"
+            words += f"\nmay be person {each.may_be}" if each.may_be else ""
+            picture = roi.cut(video.read(frame), PICTURE_PX)
+            portraits.append(Portrait(each.number, words, frame, picture))
         return portraits

@@ -176,9 +176,9 @@ def three_people(monkeypatch) -> list[Portrait]:
     """Three people of a video, found as soon as somebody looks for them."""
     pictures = [np.full((PICTURE_PX, PICTURE_PX, 3), 60 * n, np.uint8) for n in (1, 2, 3)]
     people = [
-        Portrait(1, 0.0, 0.9, 1.0, None, 11, pictures[0]),
-        Portrait(2, 0.2, 2.0, 0.93, None, 30, pictures[1]),
-        Portrait(3, 1.4, 2.0, 1.0, 1, 52, pictures[2]),
+        Portrait(1, "Person 1\n0.0 to 0.9 s\n100 % certain", 11, pictures[0]),
+        Portrait(2, "Person 2\n0.2 to 2.0 s\n93 % certain", 30, pictures[1]),
+        Portrait(3, "Person 3\n1.4 to 2.0 s\n100 % certain\nmay be person 1", 52, pictures[2]),
     ]
     monkeypatch.setattr("sd2app.fit.setup.portraits_of", lambda path, emit: emit(0.5) or people)
     return people
