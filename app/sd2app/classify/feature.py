@@ -191,12 +191,9 @@ def recall_text(check: CheckPoint) -> str:
 
 def class_chart(history: ClassHistory) -> Chart:
     """Recall in per cent and, faint, the loss as a share of the first one, over the steps."""
-    losses, checks = history.losses, history.checks
+    losses, checks, best = history.losses, history.checks, history.best
     first = max(losses[0][1], 1e-9) if losses else 1.0
     marks = [Mark(one.step, 100 * one.recall, _check_text(one)) for one in checks]
-    best = next(
-        (mark for mark, one in zip(marks, checks, strict=True) if one is history.best), None
-    )
     return Chart(
         Scale(0.0, float(max(history.total, 1))),
         Scale(0.0, 100.0, values=(0, 25, 50, 75, 100)),
@@ -213,7 +210,7 @@ def class_chart(history: ClassHistory) -> Chart:
             Curve("recall, validation", "real", [(one.x, one.y) for one in marks], dot_px=2.0),
         ],
         marks,
-        best,
+        None if best is None else marks[checks.index(best)],
     )
 
 

@@ -261,7 +261,7 @@ def _can_pause(run: TrainingMonitor) -> bool:
 
 def training_chart(history: TrainingHistory) -> Chart:
     """Errors over the epochs, on a logarithmic axis; the best epoch is marked."""
-    epochs = history.epoch_points
+    epochs, best = history.epoch_points, history.best
     trained = [(one.epoch, one.train_rmse) for one in epochs]
     validated = [(one.epoch, one.validation_rmse) for one in epochs]
     curves = [
@@ -273,9 +273,6 @@ def training_chart(history: TrainingHistory) -> Chart:
     shown = [y for curve in curves[len(epochs) >= 2 :] for _, y in curve.points] or [0.1, 1.0]
     last = max((at for at, _ in [*trained[-1:], *history.step_points[-1:]]), default=0.0)
     marks = [Mark(one.epoch, one.validation_rmse, point_text(one)) for one in epochs]
-    best = next(
-        (mark for mark, one in zip(marks, epochs, strict=True) if one is history.best), None
-    )
     return Chart(
         Scale(0.0, last or 1.0, whole=last >= 2),
         Scale.around(shown, _PAD, _MIN_RATIO, tick_text),
@@ -283,7 +280,7 @@ def training_chart(history: TrainingHistory) -> Chart:
         "RMSE",
         curves,
         marks,
-        best,
+        None if best is None else marks[epochs.index(best)],
     )
 
 
