@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from html import escape
+from itertools import starmap
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QActionGroup
-from PySide6.QtWidgets import QFormLayout, QLabel, QMenu, QScrollArea, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QMenu, QTextBrowser, QToolButton, QWidget
 
 from sd2app.feature import Shell
 from sd2app.widgets.dialogs import Dialog, ask_file, closing
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.model_page import ModelPage, model_title
-from sd2app.widgets.panel import sentence, side_by_side, title
+from sd2app.widgets.panel import side_by_side, title
 
 _LONGEST = 14
 
@@ -154,32 +156,33 @@ class ModelCardDialog(Dialog):
 
     def __init__(self, page: ModelPage, parent: QWidget) -> None:
         super().__init__(f"Model: {page.title}", parent)
-        inside = QWidget(self)
-        form = QFormLayout(inside)
-        form.setContentsMargins(16, 8, 16, 16)
-        form.setHorizontalSpacing(24)
-        form.setVerticalSpacing(4)
         head = [title(page.title)]
         if page.simulated:
             badge = QLabel("simulated data only", self)
             badge.setObjectName("badge")
             badge.setToolTip("No real radar was there when this model learned")
             head.append(badge)
-        form.addRow(side_by_side(*head, spacing_px=12))
-        for heading, rows in (("", page.rows), *page.sections):
-            if heading:
-                above = title(heading)
-                above.setMinimumHeight(32)
-                above.setAlignment(Qt.AlignmentFlag.AlignBottom)
-                form.addRow(above)
-            for name, text in rows:
-                value = sentence(text, "")
-                if name:
-                    form.addRow(sentence(name), value)
-                else:
-                    form.addRow(value)
-        scroll = QScrollArea(self)
-        scroll.setWidget(inside)
-        scroll.setWidgetResizable(True)
-        self.setLayout(column_of(scroll, closing(self)))
+        facts = QTextBrowser(self)
+        facts.setAccessibleName("What the model is")
+        muted = self.palette().placeholderText().color().name()
+        facts.document().setDefaultStyleSheet(f".name {{ color: {muted}; }}")
+        facts.setHtml("".join(starmap(_section, (("", page.rows), *page.sections))))
+        above = side_by_side(*head, spacing_px=12)
+        self.setLayout(column_of(above, (facts, 1), closing(self), spacing_px=12, margins_px=16))
         self.resize(640, 560)
+
+
+def _section(heading: str, rows: Sequence[tuple[str, str]]) -> str:
+    """Rows of a page as HTML; a thousand labels in a form would take more than a second."""
+    lines = "".join(
+        f'<tr><td class="name" width="28%">{escape(name)}</td><td>{_lines(text)}</td></tr>'
+        if name
+        else f'<tr><td colspan="2">{_lines(text)}</td></tr>'
+        for name, text in rows
+    )
+    above = f"<h3>{escape(heading)}</h3>" if heading else ""
+    return f'{above}<table width="100%" cellpadding="3">{lines}</table>'
+
+
+def _lines(text: str) -> str:
+    return escape(text).replace("\n", "<br>")

@@ -14,7 +14,7 @@ from dropping import drop, hover
 from fake_classifiers import CLASSES, expected
 from label_hands import CONTROL, LEFT, SHIFT, key
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
+from PySide6.QtWidgets import QFileDialog, QLabel, QTextBrowser, QToolButton
 from small_pairs import write_pairs
 from window_models import models_of
 
@@ -257,6 +257,7 @@ def test_the_card_calls_simulated_what_is(classified, qtbot):
 
     def read(dialog):
         texts.extend(label.text() for label in dialog.findChildren(QLabel))
+        texts.extend(dialog.findChild(QTextBrowser).toPlainText().splitlines())
         dialog.reject()
 
     once_asked(ModelCardDialog, read)

@@ -13,7 +13,7 @@ from fake_denoisers import fading
 from finding import button_of
 from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtGui import QColor, QGuiApplication
-from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton, QTextBrowser
 from window_models import models_of
 
 from sd2app.figures.feature import MapFigureDialog
@@ -265,6 +265,7 @@ def test_the_card_says_what_the_model_is(denoised, qtbot):
 
     def read(dialog):
         texts.extend(label.text() for label in dialog.findChildren(QLabel))
+        texts.extend(dialog.findChild(QTextBrowser).toPlainText().splitlines())
         dialog.reject()
 
     once_asked(ModelCardDialog, read)
