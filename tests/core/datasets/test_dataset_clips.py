@@ -121,7 +121,10 @@ def test_classifiers_take_the_split_of_data_sets(tmp_path: Path) -> None:
     assert (split_of(given, "validation"), split_of(given, "test")) == (["b"], ["a"])
     assert split_of([*given, LabelledSource(tmp_path / "other", "")], "test") is None
     assert {clip.kind for clip in clips_of(given, ("radar",)).clips} == {"simulated"}
-    assert {clip.kind for clip in clips_of(given, ("synthetic", "radar")).clips} == {"synthetic", "simulated"}
+    assert {clip.kind for clip in clips_of(given, ("synthetic", "radar")).clips} == {
+        "synthetic",
+        "simulated",
+    }
     with pytest.raises(Sd2Error, match="holds no denoised maps"):
         clips_of(given, ("denoised",))
     with pytest.raises(Sd2Error, match="data sets say whose they are"):
