@@ -48,6 +48,9 @@ def call_kernels() -> Iterator[None]:
         for options in _OPTIONS:
             Synthesizer(mesh, options, threads=1).map(sensor)
             yield
+        facing = replace(_PLAIN, visibility="facing")
+        Synthesizer(mesh, facing, threads=1).stretch(sensor, 0, _FRAMES, shares=False)
+        yield
     scene = WaveScene(meshes[0], PAPER_RADAR, sensor, wave=WaveOptions(model="direct"))
     scene.frame(0.1)
     yield

@@ -17,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler.histogram import Counting, Frames, Paths
-from sd2core.doppler.moving_kernels import GROUP, gather_kernel, moving_kernel
+from sd2core.doppler.moving_kernels import (
+    GROUP,
+    gather_kernel,
+    moving_kernel,
+    moving_normals_kernel,
+)
 
 _LARGEST_SHARE = 0.6
 """Share of moving vertices up to which they are counted faster than everything
@@ -72,6 +77,15 @@ class MovingVertices(Paths):
         rows = np.minimum(frames, len(values) - 1)
         result = np.empty(GROUP * columns.shape[1] * len(self.vertex), values.dtype)
         gather_kernel(columns, rows, self.vertex, self.first, result)
+        return result
+
+    def normals(self, points: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.int8]:
+        """Normals of what moves, as :meth:`of` orders them.
+
+        ``points`` (frames, 3, V) are those of all vertices.
+        """
+        result = np.empty(GROUP * 3 * len(self.vertex), np.int8)
+        moving_normals_kernel(points, faces, self.vertex, self.first, result)
         return result
 
 

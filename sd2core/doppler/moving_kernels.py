@@ -6,7 +6,7 @@ import numpy as np
 
 from sd2core.doppler.kernels import multiplicity_seen
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.visibility import facing_kernel
+from sd2core.scattering.visibility import add_cross_product, facing_kernel, set_normal
 
 GROUP = 4
 """Frames whose moving vertices are kept together. With more, knots are shared by more frames, but
@@ -62,6 +62,52 @@ def gather_kernel(values, rows, vertex, first, result):  # type: ignore[no-untyp
                 for p in range(first[group], first[group + 1]):
                     result[at] = values[row, column, vertex[p]]
                     at += 1
+
+
+@compiled
+def moving_normals_kernel(points, faces, vertex, first, normals):  # type: ignore[no-untyped-def]
+    """Write the normals of the vertices that move, as :func:`gather_kernel` orders them.
+
+    They are those of :func:`sd2core.scattering.visibility.vertex_normals_kernel`, of which only
+    the triangles at these vertices are looked at.
+
+    Parameters
+    ----------
+    points : float32 (frames, 3, V)
+        All vertices.
+    faces : int32 (F, 3)
+        All triangles.
+    vertex, first
+        Those of :class:`~sd2core.doppler.histogram.Paths`.
+    normals : int8, flat
+        Written; of a last group with fewer frames what is missing is left.
+    """
+    total = np.empty((points.shape[2], 3), np.float64)
+    moves = np.zeros(points.shape[2], np.bool_)
+    near = np.empty(faces.shape[0], np.int64)
+    for group in range(first.shape[0] - 1):
+        numbers = vertex[first[group] : first[group + 1]]
+        count = numbers.shape[0]
+        moves[:] = False
+        for v in numbers:
+            moves[v] = True
+        faces_near = 0
+        for f in range(faces.shape[0]):
+            near[faces_near] = f
+            faces_near += moves[faces[f, 0]] | moves[faces[f, 1]] | moves[faces[f, 2]]
+        for t in range(group * GROUP, min((group + 1) * GROUP, points.shape[0])):
+            x, y, z = points[t, 0], points[t, 1], points[t, 2]
+            for f in near[:faces_near]:
+                for corner in range(3):
+                    total[faces[f, corner]] = 0
+            for v in numbers:
+                total[v] = 0
+            for f in near[:faces_near]:
+                add_cross_product(x, y, z, faces[f], total)
+            at = 3 * (GROUP * first[group] + (t - group * GROUP) * count)
+            here = normals[at : at + 3 * count].reshape((3, count))
+            for p in range(count):
+                set_normal(total, numbers[p], here, p)
 
 
 @compiled

@@ -253,7 +253,11 @@ class PreparedMesh:
 
         With ``moving`` those of what moves, as :meth:`MovingVertices.of` orders them.
         """
-        return self._kept("normals", block, self._normals, moving)
+
+        def few(block: Block, moving: MovingVertices) -> NDArray[np.int8]:
+            return moving.normals(self._at_frames(block), self._faces())
+
+        return self._kept("normals", block, self._normals, moving, few)
 
     def count_facing(
         self, block: Block, rows: slice, place_m: NDArray[np.float64], visible: NDArray[np.float64]
@@ -360,13 +364,20 @@ class PreparedMesh:
         block: Block,
         make: Callable[[Block], NDArray[Any]],
         moving: MovingVertices | None = None,
+        few: Callable[[Block, MovingVertices], NDArray[Any]] | None = None,
     ) -> NDArray[Any]:
-        """Derived array of a block, or its part of what moves, from memory or computed now."""
+        """Derived array of a block, or its part of what moves, from memory or computed now.
+
+        That part is taken from the whole, unless ``few`` makes it where the whole is not known.
+        """
 
         def sized() -> tuple[NDArray[Any], int]:
-            every = None if moving is None else self.budget.get((what, block.index))
-            made = make(block) if every is None else every
-            made = made if moving is None else moving.of(made)
+            if moving is None:
+                made = make(block)
+            elif (every := self.budget.get((what, block.index))) is not None:
+                made = moving.of(every)
+            else:
+                made = moving.of(make(block)) if few is None else few(block, moving)
             return made, made.nbytes
 
         key = (what, block.index) if moving is None else self._moving_key(what, block.index)

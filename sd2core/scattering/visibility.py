@@ -39,6 +39,49 @@ def encloses(faces: NDArray[np.int32]) -> bool:
 
 
 @compiled
+def add_cross_product(x, y, z, face, total):  # type: ignore[no-untyped-def]
+    """Add the edge cross product of a triangle to the totals of its vertices.
+
+    Parameters
+    ----------
+    x, y, z : float array, shape (V,)
+        Places of the vertices.
+    face : int32 array, shape (3,)
+    total : float64 array, shape (V, 3)
+        Added to.
+    """
+    i, j, k = face[0], face[1], face[2]
+    px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
+    ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
+    bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    for v in (i, j, k):
+        total[v, 0] += nx
+        total[v, 1] += ny
+        total[v, 2] += nz
+
+
+@compiled
+def set_normal(total, v, normal, at):  # type: ignore[no-untyped-def]
+    """Write the normal of a vertex, :data:`NORMAL_SCALE` long.
+
+    Parameters
+    ----------
+    total : float64 array, shape (V, 3)
+        Sums of :func:`add_cross_product`; a sum of 0 gives a normal of 0.
+    v : int
+        Vertex, a row of ``total``.
+    normal : int8 array, shape (3, ...)
+        Written in column ``at``.
+    at : int
+    """
+    length = np.sqrt(total[v, 0] ** 2 + total[v, 1] ** 2 + total[v, 2] ** 2)
+    factor = NORMAL_SCALE / length if length > 0 else 0.0
+    for axis in range(3):
+        normal[axis, at] = np.int8(np.rint(total[v, axis] * factor))
+
+
+@compiled
 def sum_cross_products(
     points: NDArray[Any],  # (3, V)
     faces: NDArray[np.int32],
@@ -48,15 +91,7 @@ def sum_cross_products(
     x, y, z = points[0], points[1], points[2]
     total[:] = 0
     for f in range(faces.shape[0]):
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
-        ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
-        bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
-        nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        for v in (i, j, k):
-            total[v, 0] += nx
-            total[v, 1] += ny
-            total[v, 2] += nz
+        add_cross_product(x, y, z, faces[f], total)
 
 
 @compiled
@@ -74,10 +109,7 @@ def vertex_normals_kernel(
     for t in range(positions.shape[0]):
         sum_cross_products(positions[t], faces, total)
         for v in range(vertices):
-            length = np.sqrt(total[v, 0] ** 2 + total[v, 1] ** 2 + total[v, 2] ** 2)
-            factor = NORMAL_SCALE / length if length > 0 else 0.0
-            for axis in range(3):
-                normals[t, axis, v] = np.int8(np.rint(total[v, axis] * factor))
+            set_normal(total, v, normals[t], v)
 
 
 def facing_mask(
