@@ -92,7 +92,7 @@ def count_expected(
     group = np.searchsorted(pairs, number)
     limb, part = pairs % sigma_bins.shape[1], pairs // sigma_bins.shape[1]
     place, axis = ends.astype(frames.positions.dtype), counting.arguments()
-    sigma = sigma_bins[:, limb]
+    sigma = sigma_bins.take(limb, axis=1)  # rows on end, of one type for the compiler
     room = 0 if counting.beyond == WRAP else math.ceil(REACH * sigma.max()) + 1
     fine_kernel(
         tuple(frames.paths()), counting.scale(frames.duration_s, place.dtype),

@@ -17,6 +17,7 @@ from scipy.special import ndtr
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, expected
 from sd2core.doppler.expected import spread_over_bins
 from sd2core.doppler.histogram import counting_of
+from sd2core.doppler.limb_kernels import fine_kernel
 from sd2core.doppler.options import chosen_options
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
@@ -237,6 +238,14 @@ def test_frames_without_a_person_are_empty() -> None:
     assert not found.values[:, 8:12].any()
     assert found.values[:, 7].any()
     assert found.values[:, 12].any()
+
+
+def test_one_frame_and_many_need_the_same_machine_code() -> None:
+    maker = Synthesizer(scene(), EXPECTED)
+    for stop in (1, FRAMES):
+        maker.stretch(ASIDE, 0, stop)
+    kernel: Any = fine_kernel
+    assert len({str(arguments[7]) for arguments in kernel.signatures}) == 1
 
 
 @pytest.mark.parametrize("sigma_mps", [0.1, 0.3, 0.5])
