@@ -44,6 +44,15 @@ def test_arrays_come_back_in_their_order(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found[name], array)
 
 
+def test_what_else_was_packed_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "more.npz"
+    np.savez(path, one=np.arange(3))
+    with zipfile.ZipFile(path, "a") as archive:
+        for name in ("README.txt", "notes/", "__MACOSX/._one"):
+            archive.writestr(name, b"")
+    assert {name: array.tolist() for name, array in read(path).items()} == {"one": [0, 1, 2]}
+
+
 def test_a_small_file_that_inflates_is_refused_until_the_limit_is_raised(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
