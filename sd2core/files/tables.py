@@ -45,7 +45,7 @@ def bytes_text(count: float) -> str:
     for unit, size in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= size:
             value = count / size
-            return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
+            return f"{value:.0f} {unit}" if value >= 10 else f"{value:.2g} {unit}"
     return f"{count:.0f} bytes"
 
 

@@ -227,7 +227,10 @@ def test_an_undo_takes_the_place_of_what_was_typed(stage):
 
 @pytest.mark.parametrize(
     ("count", "text"),
-    [(0, "0 bytes"), (999, "999 bytes"), (8160, "8.2 kB"), (18_360_000, "18 MB"), (2e11, "200 GB")],
+    [
+        *((0, "0 bytes"), (999, "999 bytes"), (8160, "8.2 kB"), (99_700, "100 kB")),
+        *((18_360_000, "18 MB"), (99_700_000, "100 MB"), (2e11, "200 GB")),
+    ],
 )
 def test_bytes_are_said_in_their_unit(count, text):
     assert bytes_text(count) == text
