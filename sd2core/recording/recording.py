@@ -374,7 +374,7 @@ class Recording:
         def stored(_: Role, path: Path | str) -> str:
             return stored_path(Path(path), self.folder)
 
-        document = self._read.model_copy(deep=True)
+        document = self._read.model_copy()
         scene = _with_files(self.things, self.bodies, stored)
         settings = {name: getattr(self, name) for name in _AS_THEY_ARE} | {
             "version": VERSION,
