@@ -14,6 +14,7 @@ from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.maps import DopplerMap, LimbMaps
+from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
@@ -161,11 +162,10 @@ def empty_map(options: SynthesisOptions, mesh: MeshSequence) -> DopplerMap:
 
 
 def pieces(wanting: NDArray[np.bool_], start: int, stop: int, size: int) -> Iterator[View]:
-    """Stretches of at most ``size`` frames that have all that want something between two."""
-    for first in range(start, stop, size):
-        wanted = first + np.flatnonzero(wanting[first : min(first + size, stop)])
-        if wanted.size:
-            yield int(wanted[0]), int(wanted[-1]) + 1
+    """Stretches of at most ``size`` frames all of which want something."""
+    for first, last in runs(wanting[start:stop]):
+        for at in range(start + first, start + last, size):
+            yield at, min(at + size, start + last)
 
 
 @dataclass(frozen=True, eq=False)
