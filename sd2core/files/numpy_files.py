@@ -55,8 +55,7 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
     try:
         with open_zip(path) as archive, NpzArrays(cast(IO[bytes], archive.fp)) as arrays:
             # A note, a folder or whatever else was packed with them is no array.
-            packed = {*archive.namelist()}
-            arrays.files = [name for name in arrays.files if f"{name}.npy" in packed]
+            arrays.files = [name[:-4] for name in archive.namelist() if name.endswith(".npy")]
             yield arrays
     except Sd2Error:
         raise
