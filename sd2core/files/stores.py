@@ -15,7 +15,7 @@ import os
 import stat
 import zipfile
 from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -44,6 +44,7 @@ _DESCRIPTIONS = ("zarr.json", ".zgroup", ".zarray", ".zattrs", ".zmetadata")
 _PARSED = 8
 """Memory of a description once it is parsed, as a multiple of its text, at least."""
 _WHOLE, COPY_AGAIN = "a complete Zarr store", "Copy it again from where it came, or write it again"
+_reading = functools.partial(reading_as, "a Zarr group", expected=_WHOLE, remedy=COPY_AGAIN)
 
 
 @dataclass(frozen=True)
@@ -360,10 +361,6 @@ def unreadable(path: Path, damage: str | Iterable[Damage]) -> Sd2Error:
     """Error that names what of a store cannot be read."""
     what = damage if isinstance(damage, str) else "; ".join(map(str, damage))
     return Sd2Error(f"{path} cannot be read: {what}", "chunks as they were written", COPY_AGAIN)
-
-
-def _reading(path: Path) -> AbstractContextManager[None]:
-    return reading_as("a Zarr group", path, _WHOLE, COPY_AGAIN)
 
 
 def _rows(key: Any, shape: tuple[int, ...]) -> range | None:

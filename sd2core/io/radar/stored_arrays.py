@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,6 +36,7 @@ _MATLAB_NUMBERS = frozenset(
     {"double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
 )
 """Classes of MATLAB."""
+_reading_matlab = partial(reading_as, "MATLAB's", expected="a whole .mat", remedy="Copy it again")
 
 _BLOCK_BYTES = 32 << 20
 """Of an .npy that are read at once, though a part of each row may be wanted."""
@@ -217,7 +218,7 @@ def _matlab(path: Path, dataset: str | None) -> StoredArray:
 
     declared_bytes = 16 * math.prod(arrays[name])
     check_size(f"{name} of {path}", declared_bytes, path.stat().st_size)
-    with _matlab_damage(path):
+    with _reading_matlab(path):
         values: NDArray[Any] = loadmat(path, variable_names=[name])[name]
     return StoredArray(values.shape, values.dtype, values.__getitem__)
 
@@ -227,12 +228,8 @@ def _matlab_arrays(path: Path) -> list[tuple[str, tuple[int, ...], str]]:
     from scipy.io import whosmat
 
     check_regular(path)
-    with _matlab_damage(path):
+    with _reading_matlab(path):
         return [(str(name), tuple(map(int, shape)), kind) for name, shape, kind in whosmat(path)]
-
-
-def _matlab_damage(path: Path) -> AbstractContextManager[None]:
-    return reading_as("MATLAB's", path, "a whole .mat", "Copy it again")
 
 
 def _sigmf(path: Path) -> StoredArray:
