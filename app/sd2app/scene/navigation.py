@@ -44,6 +44,8 @@ class _Held:
     at_m: Vector  # where it was taken hold of
     offset_px: tuple[float, float]
     moved_m: Vector
+    start_m: Vector  # where it was when its constraint was chosen
+    constraint: Constraint
 
 
 class Navigator:
@@ -123,7 +125,8 @@ class Navigator:
         if target is not None and target.place_m is not None:
             x, y, _ = self._scene.pose.project(target.place_m)[0]
             number = None if target.kind == "sensor" else target.number
-            self._held = _Held(number, target.place_m, (x - x_px, y - y_px), np.zeros(3))
+            start_m, offset_px = target.place_m, (x - x_px, y - y_px)
+            self._held = _Held(number, start_m, offset_px, np.zeros(3), start_m, _constraint(keys))
             if number is None:
                 self._edits.begin_sensor_drag()
             else:
@@ -190,16 +193,17 @@ class Navigator:
 
     def _drag(self, held: _Held, x_px: float, y_px: float, constraint: Constraint) -> None:
         x, y = x_px + held.offset_px[0], y_px + held.offset_px[1]
-        # From here, where another constraint must not make it jump.
-        pose, now = self._scene.pose, held.at_m + held.moved_m
+        if constraint != held.constraint:  # go on from here: it must not jump
+            held.start_m, held.constraint = held.at_m + held.moved_m, constraint
+        pose, start = self._scene.pose, held.start_m
         if constraint == "vertical":
-            at = drag_along(now, np.array([0.0, 1.0, 0.0]), pose, x, y)
+            at = drag_along(start, np.array([0.0, 1.0, 0.0]), pose, x, y)
         elif held.number is not None:
-            at = drag_level(now, pose, x, y)
+            at = drag_level(start, pose, x, y)
         elif constraint == "sight":
-            at = drag_along(now, self._scene.extent.centre_m - now, pose, x, y)
+            at = drag_along(start, self._scene.extent.centre_m - start, pose, x, y)
         else:
-            at = drag_in_view(now, pose, x, y)
+            at = drag_in_view(start, pose, x, y)
         if at is None:
             return
         held.moved_m = at - held.at_m

@@ -118,6 +118,22 @@ def test_changing_the_constraint_goes_on_from_where_the_sensor_is(hand: Hand) ->
     assert np.linalg.norm(hand.sensor_m - middle) < 0.02
 
 
+@pytest.mark.parametrize(("preset", "keys"), [("overview", CTRL), ("top", SHIFT), ("camera", CTRL)])
+def test_a_line_brings_the_sensor_back_from_however_far(
+    hand: Hand, preset: str, keys: Qt.KeyboardModifier
+) -> None:
+    hand.scene.pose = hand.scene.preset_pose(preset)
+    hand.scene.set_sensor(VirtualSensor((0.9, -0.6, 0.3)))
+    before, start = hand.sensor_m, hand.sensor_px
+    line = hand.scene.extent.centre_m - before if keys == CTRL else np.array([0.0, 2.0, 0.0])
+    hand.navigator.press(*start, LEFT, keys)
+    for share in np.linspace(0.0, 10.0, 100):
+        hand.navigator.move(*hand.scene.pose.project(before + share * line)[0][:2], keys)
+    assert np.linalg.norm(hand.sensor_m - before) > 5.0
+    hand.navigator.move(*start, keys)
+    np.testing.assert_allclose(hand.sensor_m, before, atol=1e-6)
+
+
 @pytest.mark.parametrize(("button", "keys"), [(LEFT, NONE), (MIDDLE, NONE), (LEFT, SHIFT)])
 def test_the_view_moves_and_the_sensor_does_not(
     hand: Hand, button: Qt.MouseButton, keys: Qt.KeyboardModifier
