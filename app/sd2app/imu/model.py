@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner, ReportingModel
+from sd2app.background.latest import Emit, LatestRunner, ProblemModel, ReportingModel
 from sd2app.session.session import Session
 from sd2app.widgets.time_axis import clock_text
 from sd2core.errors import Sd2Error
@@ -30,7 +30,7 @@ def place_words(place: str) -> str:
     return f"vertex {place}" if place.isdecimal() else place.replace("-", " ")
 
 
-class ImuModel(ReportingModel):
+class ImuModel(ReportingModel, ProblemModel):
     """Sensors of the recording, of which one is shown; its signals are computed in the background.
 
     A recording has any number of virtual sensors, and one file of a real one.
@@ -44,7 +44,6 @@ class ImuModel(ReportingModel):
         self._session, self._document = session, session.document
         self.signals: InertialSignals | None = None  # of the current sensor, simulated
         self.measured: InertialSignals | None = None  # of the real one, on its own clock
-        self.problem = ""  # why the current sensor has no signals
         self.vertices: Mapping[str, int] = {}  # that sensors sit on, by their places
         self.folded = session.settings.stored(_FOLDED, False)
         self._chosen: str | None = None
@@ -195,10 +194,6 @@ class ImuModel(ReportingModel):
 
     def _receive(self, signals: InertialSignals) -> None:
         self._known[self._request[-1]] = self.signals = signals
-        self.changed.emit()
-
-    def _refuse(self, error: Exception) -> None:
-        self.problem = str(error)
         self.changed.emit()
 
     # --- the real sensor ------------------------------------------------------------------
