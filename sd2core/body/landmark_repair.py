@@ -171,8 +171,9 @@ def find_jumps(track: RawTrack) -> NDArray[np.bool_]:
     from scipy.ndimage import maximum_filter
 
     scale = pixels_per_metre(track)[rows, None]
-    places = np.stack([place_m(track, rows, scale, n) for n in range(len(LANDMARKS))])  # (33, N, 5)
-    moved_m = np.median(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=0)  # (N - 1,)
+    places = (place_m(track, rows, scale, number) for number in range(len(LANDMARKS)))  # (N, 5)
+    each_m = [np.linalg.norm(np.diff(place, axis=0), axis=1) for place in places]
+    moved_m = np.median(each_m, axis=0)  # (N - 1,)
     step_s = np.diff(track.times_s[rows])
     known = (np.diff(rows) == 1) & (step_s < 1.1 * _AROUND_S)
     beside = max(round(_AROUND_S / float(np.median(step_s))), 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -260,6 +261,14 @@ class TestJumps:
         arm = [LANDMARKS.index(f"{part}.R") for part in ("elbow", "wrist", "index", "pinky")]
         found.image_px[15:, arm] += np.float32(PX_PER_M * 0.4)
         assert not find_jumps(found).any()
+
+    def test_of_long_clips_one_landmark_after_the_other_is_held(self) -> None:
+        found = waving(np.arange(4000) / 30.0)
+        tracemalloc.start()
+        find_jumps(found)
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert most < 5 * found.visibility.size * 8
 
 
 def test_what_was_done_is_said() -> None:
