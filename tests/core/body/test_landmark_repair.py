@@ -238,7 +238,7 @@ class TestJumps:
     @given(
         rate_hz=st.sampled_from([10.0, 15.0, 30.0, 60.0]),
         far_m=st.floats(0.0, 3.0),
-        duration_s=st.floats(0.25, 1.0),
+        duration_s=st.floats(0.3, 1.0),
         begin_s=st.floats(0.2, 1.0),
         noise_m=st.floats(0.0, 0.01),
     )
