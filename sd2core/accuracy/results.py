@@ -275,6 +275,9 @@ def plot_cost_and_error(measurement: Measurement, choice: Choice | None = None) 
         ylabel="relative L1 after smoothing",
         title=f"{measurement.source}, {measurement.machine}",
     )
+    # Within a decade or two the library names more ticks than there is room for.
+    axes.xaxis.set_major_formatter(lambda ms, _: f"{ms:g}")
+    axes.xaxis.set_minor_formatter(lambda ms, _: f"{ms:g}" if f"{ms:.0e}"[0] in "25" else "")
     axes.grid(which="both", alpha=0.2)
     axes.legend(title="visibility", fontsize=8)
     return figure

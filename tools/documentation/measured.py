@@ -49,7 +49,7 @@ OLD = {
     "classifier.md": "since then longer waves, several people and what lost frames changed",
     "real-gestures.md": "since then only what lost frames has changed",
     "studies.md": "since then only what lost frames, and when pairs are made anew, has changed",
-    "real-pairs.md": "since then only how a training is cancelled has changed",
+    "real-pairs.md": "since then only how trainings are cancelled and frames come live has changed",
 }
 """Pages that may be older than the program, and why they were not measured anew."""
 
