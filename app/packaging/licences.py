@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import functools
 import importlib.metadata
+import mmap
 import os
 import re
 import shutil
@@ -86,7 +87,13 @@ def allowed(licence: str, among: frozenset[str]) -> bool:
 def place(path: str) -> str:
     """Path by which files are compared: in its real folder, by the name that is used."""
     folder, name = os.path.split(path)
-    return os.path.join(os.path.realpath(folder), name)
+    return os.path.join(real_folder(folder), name)
+
+
+@functools.cache
+def real_folder(folder: str) -> str:
+    """A folder without links in its path; asked once, as most hold many files."""
+    return os.path.realpath(folder)
 
 
 @functools.cache
@@ -127,7 +134,10 @@ def table() -> list[tuple[re.Pattern[str], dict[str, str]]]:
 
 def holds(path: str, mark: str) -> bool:
     """Whether these words are in a file: some libraries say how they were built."""
-    return mark.encode() in Path(path).read_bytes()
+    if not os.path.getsize(path):
+        return False  # it cannot be mapped
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        return content.find(mark.encode()) >= 0
 
 
 def native(name: str, path: str) -> list[dict[str, str]]:
