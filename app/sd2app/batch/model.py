@@ -161,7 +161,6 @@ class BatchModel(Runs[BatchMonitor]):
     def _read_results(self) -> None:
         run = self.run
         if run is not None and run.loaded and not run.under_way:
-            plan_of(run.path).unlink(missing_ok=True)
             self.results.read(run.folder)
 
     def say_ended(self, run: BatchMonitor) -> None:

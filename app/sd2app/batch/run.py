@@ -93,6 +93,11 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         """True if the same command would go on with it."""
         return not self.under_way and self.phase != "gone" and self.folder.plan.exists()
 
+    def _settle(self) -> None:
+        super()._settle()
+        if not self.under_way:
+            plan_of(self.path).unlink(missing_ok=True)
+
 
 STEP_WORDS = {
     "inspect": "Look at recordings",
