@@ -204,11 +204,13 @@ class LiveModel(SteeredCommand):
             return
         self._map, self._new = extended(before, self._new), []
         is_longer = is_first or self._map is not before
-        if is_first or (self.on_screen and not self._document.growing):
+        if not (is_first or self.on_screen):
+            return
+        if is_first or not self._document.growing:
             self._follow()
-        elif self.on_screen and is_longer:
+        elif is_longer:
             self._document.grow(self._map)
-        if is_first or (self.on_screen and is_longer):
+        if is_longer:
             self._keep_reference()
             self._painted.start()
 
